@@ -123,8 +123,7 @@ def as_recorded(experiment: Experiment) -> Experiment:
     """Return an experiment that recorded signals drive as they are, with their noise."""
     if experiment.recorded is None:
         return experiment
-    simulator, own = experiment.recorded
-    white = experiment.whitening
+    (simulator, own), white = experiment.recorded, experiment.whitening
     if white is not None:  # its errors were shifted to those of the signals as recorded
         white = white._replace(shift=np.zeros_like(white.shift))
     return replace(experiment, simulator=simulator, own=own, recorded=None, whitening=white)

@@ -1,7 +1,6 @@
 """Records beside simulations, as blocks."""
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from math import isnan, nan
 
 from exfit.dsp.features import LABELS
 from exfit.output.blocks import (
@@ -29,8 +28,8 @@ FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interv
 
 def comparisons(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
     """Yield the match of each record, side by side, and its step measured beside simulated."""
-    if all_of_them:
-        yield _errors(all_of_them)
+    if answered := [match for match in all_of_them if match.overlays]:
+        yield _errors(answered)
     yield from played(all_of_them)
     stepped = {
         match.name: match.features
@@ -158,23 +157,17 @@ def validation(result: ValidationResult) -> Iterator[Block]:
 def _errors(matches: Sequence[Comparison]) -> Table:
     signals = list(dict.fromkeys(signal for match in matches for signal in match.channels))
     of_events = f" {matches[0].judged_by}" if matches[0].is_event else ""
-    rows = [row("cost", "pu²", *(_cell(match.cost, ".4e") for match in matches))]
+    rows = [row("cost", "pu²", *(f"{match.cost:.4e}" for match in matches))]
     for signal in signals:
         errors = (match.channels.get(signal) for match in matches)
-        cells = (_cell(nan if error is None else error.rmse) for error in errors)
+        cells = ("-" if error is None else f"{error.rmse:.3e}" for error in errors)
         rows.append(row("rmse" if len(signals) == 1 else f"rmse {signal}", "pu", *cells))
-    largest = (_cell(match.max_error) for match in matches)
+    largest = (f"{match.max_error:.3e}" for match in matches)
     rows.append(row(f"maximum error{of_events}", "pu", *largest))
-    fits = (match.fit_percent for match in matches)
-    percentages = ("-" if isnan(fit) else percentage(fit) for fit in fits)
+    percentages = (percentage(match.fit_percent) for match in matches)
     rows.append(row(f"fit{of_events}", "%", *percentages))
     names = (TableColumn(match.name, number=True, folds=True) for match in matches)
     return Table((*columns("", "unit"), *names), tuple(rows), leading=2)
-
-
-def _cell(error: float, digits: str = ".3e") -> str:
-    """Write an error, a dash where there is no response."""
-    return "-" if isnan(error) else format(error, digits)
 
 
 def _peak(excursion: Excursion | None) -> str:

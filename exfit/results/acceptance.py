@@ -46,22 +46,13 @@ def judged(
     return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
 
 
-def without_response(setup: ExperimentSetup, why: str) -> Comparison:
-    """Return a validation that the values have no response to, not accepted, for the reason given.
-
-    Values that one record was fitted with need not have a state of rest in another.
-    """
-    return Comparison(
-        name=setup.name,
-        record=setup.record.source.name,
-        cost=nan,
-        accepted=False,
-        channels={channel.signal: Match(nan, nan, nan) for channel in setup.channels},
-        features=StepFeatures(None, None),
-        reason=why,
-        validation=True,
-        sha256=setup.record.sha256,
-    )
+def without_response(setup: ExperimentSetup, fault: Exception) -> Comparison:
+    """Return a validation that the values have no response to, which is not accepted."""
+    why, record = str(fault).removeprefix(f"{setup.case}: "), setup.record
+    channels = {channel.signal: Match(nan, nan, nan) for channel in setup.channels}
+    features = StepFeatures(None, None)
+    own = Comparison(setup.name, record.source.name, nan, False, channels, features, reason=why)
+    return replace(own, validation=True, sha256=record.sha256)
 
 
 def _error_of_fit(signal: str, fitted: Sequence[Comparison]) -> float | None:

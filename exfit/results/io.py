@@ -62,9 +62,7 @@ def files_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
 
 def comparison_files(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
     """Yield the samples of each comparison that has some, under its name."""
-    for match in comparisons:
-        if match.overlays:
-            yield f"{match.name}.csv", comparison_table(match)
+    return ((f"{each.name}.csv", comparison_table(each)) for each in comparisons if each.overlays)
 
 
 def result_text(result: FitResult) -> str:

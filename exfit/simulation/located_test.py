@@ -66,8 +66,7 @@ class LocatedTest:
             points = distinct(np.append(points, inside))
         if start > self.inputs.start:
             # a jump moves what is fast, which has come to rest after some steps
-            fine = start + length * AFTER_JUMP
-            points = distinct(np.append(points, fine[fine < end]))
+            points = distinct(np.append(points, (start + length * AFTER_JUMP).clip(max=end)))
         lengths = np.diff(points)
         counts = np.maximum(np.ceil(lengths / length - ON_GRID), 1.0).astype(int)
         parts = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -102,8 +101,7 @@ class LocatedTest:
         """
         if np.any(np.diff(times) < 0.0):
             order = np.argsort(times, kind="stable")
-            places = np.empty(len(order), np.intp)
-            places[order] = np.arange(len(order))
+            places = np.argsort(order)
             sorted_ones = self.reading(times[order], delay)
             return SamplePlaces(sorted_ones.positions, sorted_ones.still[places], places)
         wanted = times - delay
@@ -111,12 +109,10 @@ class LocatedTest:
         near = ON_GRID * self.step if delay == 0.0 else 0.0
         inside = self.bounds[1:-1]
         owner = np.searchsorted(inside, read - near, side="left")
-        if len(read) > 1:
-            again = np.flatnonzero(np.diff(read) == 0.0) + 1
-            again = again[wanted[again] == read[again]]
-            behind = np.searchsorted(inside, read[again], side="right")
-            jumped = behind > np.searchsorted(inside, read[again], side="left")
-            owner[again[jumped]] = behind[jumped]
+        again = np.flatnonzero((np.diff(read) == 0.0) & (wanted == read)[1:]) + 1
+        behind = np.searchsorted(inside, read[again], side="right")
+        jumped = behind > np.searchsorted(inside, read[again], side="left")
+        owner[again[jumped]] = behind[jumped]
         firsts = np.searchsorted(owner, np.arange(len(self.grids) + 1))
         positions = []
         for grid, first, last in zip(self.grids, firsts[:-1], firsts[1:], strict=True):
@@ -175,8 +171,7 @@ class LocatedTest:
             s = (positions - k)[:, None]
             c = u[k]
             parts.append(((c[..., 3] * s + c[..., 2]) * s + c[..., 1]) * s + c[..., 0])
-        inputs: Array = reading.as_asked(np.concatenate(parts)[None])[0]
-        return inputs
+        return np.asarray(reading.as_asked(np.concatenate(parts)[None])[0])
 
 
 def exact(inputs: Inputs) -> Inputs:

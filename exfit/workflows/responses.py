@@ -109,17 +109,12 @@ def validation_of(
 def judged_on(
     case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
 ) -> tuple[TestWithValues, Comparison]:
-    """Align a test that was not fitted, and judge the values on it by the ``fitted`` ones.
-
-    One that they have no response to, as one without a state of rest, is not accepted. Raises
-    KeyboardInterrupt at an interruption.
-    """
+    """Align a test that was not fitted, and judge it; one without a response is not accepted."""
     try:
         test = aligned(case, setup, values)
         return test, validation_of(case, fitted, *test)
     except SimulationError as fault:
-        why = str(fault).removeprefix(f"{case.path}: ")
-        return (setup, setup.with_start_values(values)), without_response(setup, why)
+        return (setup, setup.with_start_values(values)), without_response(setup, fault)
 
 
 class LiveResponse(NamedTuple):
