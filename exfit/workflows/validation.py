@@ -25,6 +25,7 @@ from exfit.results.comparisons import Comparison, ValidatedStep
 from exfit.results.description import OtherProgram, RecordedTest, versions
 from exfit.results.validation_result import ValidationResult
 from exfit.util.file_names import folded
+from exfit.util.text import magnitude_fault
 from exfit.util.vocabulary import NOT_STATED
 from exfit.verdict.diagnostics import causes_before_fit
 from exfit.verdict.run_quality import (
@@ -109,7 +110,9 @@ def validate(
     steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
     or where there is nothing to validate on.
     """
-    given = GivenSteps(_numbers(step), _numbers(at))
+    given = GivenSteps(_numbers("step", step), _numbers("at", at))
+    if 0.0 in given.sizes:
+        raise CaseError("step: 0 is not a step")
     if record is None and any(given):
         raise CaseError(
             f"{case.path}: step and at need a record with them: --record (record in Python)"
@@ -142,8 +145,11 @@ def validate(
     return Validation(case, own, tuple(tests), described)
 
 
-def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
-    return tuple(given) if isinstance(given, Sequence) else (given,)
+def _numbers(name: str, given: float | Sequence[float]) -> tuple[float, ...]:
+    numbers = tuple(given) if isinstance(given, Sequence) else (given,)
+    for fault in filter(None, map(magnitude_fault, numbers)):
+        raise CaseError(f"{name}: {fault}")
+    return numbers
 
 
 def _fitted(

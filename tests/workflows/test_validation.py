@@ -301,6 +301,20 @@ def test_a_case_that_has_only_records_under_validate_is_validated_with_given_val
         simulate(case)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"step": 0.0}, "step: 0 is not a step"),
+        ({"step": np.inf}, "step: inf is not a finite number"),
+        ({"step": [-0.05, 1e308]}, "step: 1e[+]308 exceeds 1e[+]100"),
+        ({"at": np.nan}, "at: nan is not a finite number"),
+    ],
+)
+def test_a_step_that_is_none_is_refused(given, words):
+    with pytest.raises(CaseError, match=words):
+        by_hand("ac1a_down", "ac1a_typical", **given)
+
+
 def test_a_fit_is_kept_whose_values_have_no_state_of_rest_in_another_record(tmp_path):
     """With the start's KD the unit rests at 1.2 pu, with that of the record it passes VRMAX."""
     time, truth = np.arange(0.0, 6.0, 0.02), TRUTH["ac1a_typical"]

@@ -30,6 +30,7 @@ from exfit.results.model import FitResult
 from exfit.signals import COMPARED
 from exfit.util.arrays import Array
 from exfit.util.file_names import WHOLE_FIT
+from exfit.util.text import magnitude_fault
 from exfit.util.typed import plain
 
 STEPS_APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
@@ -143,6 +144,8 @@ def compare(
     """
     if len(sources) == 1 and record is None:
         raise RecordError(f"{sources[0]}: one curve alone can be compared only with a record")
+    if step_at is not None and (fault := magnitude_fault(step_at)) is not None:
+        raise RecordError(f"step: {fault}")
     choice = ColumnChoice(columns or {}, time)
     paths = dict(zip(_names(len(sources)), map(Path, sources), strict=True))
     named = paths if record is None else {**paths, RECORD: Path(record)}

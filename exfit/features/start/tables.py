@@ -26,7 +26,7 @@ from exfit.records.recorded_tests import DetectedTest, tests_of
 from exfit.records.units import unit_of
 from exfit.signals import RECORDED
 from exfit.util.files import read_limited, utf8
-from exfit.util.text import near
+from exfit.util.text import near, show_value
 
 LARGEST_TABLE = 16_000_000  # bytes
 MOST_COLUMNS = 1000  # of a table
@@ -245,7 +245,7 @@ def _table_row(row: Cells, folder: Path, faults: list[str]) -> TableRow:
     base = row.read("base", base_of, faults)
     word = cells.get("validates", "").lower()
     if word not in (*YES, *NO):
-        faults.append(f"{place}: validates: {word!r} is neither yes nor no")
+        faults.append(f"{place}: validates: {show_value(word)} is neither yes nor no")
     return TableRow(
         place,
         folder / cells["file"] if cells.get("file") else None,
@@ -260,9 +260,9 @@ def _number(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise ExfitError(f"{text!r} is not a number") from None
+        raise ExfitError(f"{show_value(text)} is not a number") from None
     if not isfinite(value):
-        raise ExfitError(f"{text!r} is not a finite number")
+        raise ExfitError(f"{show_value(text)} is not a finite number")
     return value
 
 
@@ -386,7 +386,7 @@ def _ratings(unit: Cells, faults: list[str]) -> Ratings:
         text = unit.by_name.get(column) or None
         words[column] = text
         if text is not None and text not in known:
-            faults.append(f"{unit.place}: {column}: {text!r}; {near(text, known)}")
+            faults.append(f"{unit.place}: {column}: {show_value(text)}; {near(text, known)}")
     return Ratings(numbers["kv"], numbers["mva"], words["connection"], words["angle unit"])
 
 
@@ -433,19 +433,19 @@ def _of_unit(unit: Cells, dyr: Path | None, of_all: Path | None) -> Iterator[str
 
 def _bus(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 0 < int(text[:10]) <= MOST_BUSES):
-        raise ExfitError(f"{text!r} is not a whole number of 1 ... {MOST_BUSES}")
+        raise ExfitError(f"{show_value(text)} is not a whole number of 1 ... {MOST_BUSES}")
     return int(text)
 
 
 def _id(text: str) -> str:
     if len(text) > LONGEST_ID:
-        raise ExfitError(f"{text!r} has more than {LONGEST_ID} letters or digits")
+        raise ExfitError(f"{show_value(text)} has more than {LONGEST_ID} letters or digits")
     return text
 
 
 def _name(text: str) -> str:
     if not re.match(FILE_NAME, text):
-        raise ExfitError(f"{text!r} {PATTERNS[FILE_NAME]}")
+        raise ExfitError(f"{show_value(text)} {PATTERNS[FILE_NAME]}")
     return text
 
 
@@ -458,7 +458,7 @@ def _test(row: Cells, folder: Path, faults: list[str]) -> TableRow:
     if not unit:
         return test
     if unit_of(unit) is None:
-        faults.append(f"{place}: {unit!r} is not a unit of a voltage, as kV")
+        faults.append(f"{place}: {show_value(unit)} is not a unit of a voltage, as kV")
     elif base is None:
         faults.append(f"{place}: {unit}: it is that of base, which is missing")
     elif base.unit is not None:
@@ -488,7 +488,8 @@ def _settings(rows: Sequence[Cells], folder: Path, faults: list[str]) -> dict[Pa
             row = _common(of_file, [*OF_RECORD, *columns], faults)
             cells, unit = row.by_name, row.by_name["time unit"]
             if unit and unit not in TIME_UNITS:
-                faults.append(f"{row.place}: time unit: {unit!r}; {near(unit, TIME_UNITS)}")
+                meant = near(unit, TIME_UNITS)
+                faults.append(f"{row.place}: time unit: {show_value(unit)}; {meant}")
             names = (name.strip() for name in cells["time"].split(BETWEEN_COLUMNS))
             clock, sheet = tuple(filter(None, names)), cells["sheet"] or None
             settings[folder / file] = RecordSettings(

@@ -181,6 +181,13 @@ def test_features_are_of_the_time_before_the_first_ends():
     assert features["B"].final_value == pytest.approx(features["A"].final_value, abs=1e-9)
 
 
+@pytest.mark.parametrize("at", [-np.inf, np.nan, 1e308])
+def test_the_time_of_a_step_is_a_number(at):
+    a = write("a.csv", t=clock(0.01), vt=np.ones(len(clock(0.01))))
+    with pytest.raises(RecordError, match=r"step: .* (is not a finite number|exceeds)"):
+        compare([a, a], step_at=at)
+
+
 def test_without_a_step_there_are_no_features():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=np.ones(len(time)))

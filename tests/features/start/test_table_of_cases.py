@@ -94,6 +94,12 @@ def test_all_faults_are_reported_at_once_with_row_and_column(tmp_path):
     ]
 
 
+@pytest.mark.parametrize("column", ["step", "bus", "id", "validates", "unit", "time unit"])
+def test_a_message_quotes_the_beginning_of_a_cell(tmp_path, column):
+    text = f"file,dyr,base,{column}\na.csv,u.dyr,1,{'0' * 5000}x\n"
+    assert max(map(len, faults_of(tmp_path, text))) < 200
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
