@@ -111,8 +111,6 @@ def validate(
     or where there is nothing to validate on.
     """
     given = GivenSteps(_numbers("step", step), _numbers("at", at))
-    if 0.0 in given.sizes:
-        raise CaseError("step: 0 is not a step")
     if record is None and any(given):
         raise CaseError(
             f"{case.path}: step and at need a record with them: --record (record in Python)"
@@ -147,7 +145,9 @@ def validate(
 
 def _numbers(name: str, given: float | Sequence[float]) -> tuple[float, ...]:
     numbers = tuple(given) if isinstance(given, Sequence) else (given,)
-    for fault in filter(None, map(magnitude_fault, numbers)):
+    faults = [magnitude_fault(each) for each in numbers]
+    faults += ["0 is not a step"] * (name == "step" and 0.0 in numbers)
+    for fault in filter(None, faults):
         raise CaseError(f"{name}: {fault}")
     return numbers
 

@@ -144,8 +144,6 @@ def compare(
     """
     if len(sources) == 1 and record is None:
         raise RecordError(f"{sources[0]}: one curve alone can be compared only with a record")
-    if step_at is not None and (fault := magnitude_fault(step_at)) is not None:
-        raise RecordError(f"step: {fault}")
     choice = ColumnChoice(columns or {}, time)
     paths = dict(zip(_names(len(sources)), map(Path, sources), strict=True))
     named = paths if record is None else {**paths, RECORD: Path(record)}
@@ -159,9 +157,7 @@ def compare(
         _refuse_without_step(curves, clocks)
         curves = shifted(curves, clocks.apart)
     results, unread = _results(paths)
-    if (at := step_at) is None:
-        detected = (clocks.steps.get(RECORD), *clocks.steps.values())
-        at = next((step.at for step in detected if step is not None), None)
+    at = _given_or_first(step_at, [clocks.steps.get(RECORD), *clocks.steps.values()])
     of_curves = {} if at is None else dict(_features_of(curves, judged, at))
     removed = [
         f"{name}: its features are read without {of_curve.removed}"
@@ -224,6 +220,16 @@ def _shared_signals(curves: Sequence[Curve]) -> list[str]:
                 f"{curve.name} has {theirs}; name columns with --columns vt=COLUMN"
             )
     return shared
+
+
+def _given_or_first(at: float | None, steps: Iterable[DetectedStep | None]) -> float | None:
+    """Return the time of the step that is given, else of the first found; it is a number."""
+    if at is None:
+        return next((step.at for step in steps if step is not None), None)
+    fault = magnitude_fault(at)
+    if fault is not None:
+        raise RecordError(f"step: {fault}")
+    return at
 
 
 def _results(paths: Mapping[str, Path]) -> tuple[dict[str, FitResult], list[str]]:

@@ -173,28 +173,30 @@ def read_units(text: str, file: str | Path, buses: Buses = NO_BUSES) -> Dynamics
         if unit is not None:
             units.append(unit)
             continue
-        missing, first = _missing_kinds(own), own[0]
-        wrong += _lacking(own, missing)
-        unread = any(
-            not isinstance(fault, UnreadRecord) or fault.bus == first.bus for fault in faults
-        )
-        if unread and missing == ["exciter"]:
-            why = "a record that cannot be read may be its exciter"
-            wrong.append(DynamicsFault(first.line, why))
-        refused.append(
-            RefusedUnit(
-                first.bus,
-                first.id,
-                first.line,
-                tuple(head.name for head in own),
-                not missing
-                or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
-                tuple(sorted(wrong, key=lambda fault: fault.line)),
-                first.bus_name,
-                None if unread else _machine_alone(own),
-            )
-        )
+        refused.append(_refused(own, wrong, faults))
     return DynamicsUnits(tuple(units), tuple(refused), tuple(faults), classical, devices)
+
+
+def _refused(
+    own: Sequence[Head], wrong: Sequence[DynamicsFault], unread: Iterable[DynamicsFault]
+) -> RefusedUnit:
+    """Return a unit without what it needs, or with ``wrong`` records; some may be ``unread``."""
+    missing, first = _missing_kinds(own), own[0]
+    faults = [*wrong, *_lacking(own, missing)]
+    doubtful = any(not isinstance(each, UnreadRecord) or each.bus == first.bus for each in unread)
+    if doubtful and missing == ["exciter"]:
+        why = "a record that cannot be read may be its exciter"
+        faults.append(DynamicsFault(first.line, why))
+    return RefusedUnit(
+        first.bus,
+        first.id,
+        first.line,
+        tuple(head.name for head in own),
+        not missing or (any(_is_machine(head.name) for head in own) and bool(_unknown(own))),
+        tuple(sorted(faults, key=lambda fault: fault.line)),
+        first.bus_name,
+        None if doubtful else _machine_alone(own),
+    )
 
 
 def read_unit(
