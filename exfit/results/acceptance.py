@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import nan
 
 import numpy as np
 
-from exfit.fitting.experiment import Channel, ExperimentSetup
+from exfit.fitting.experiment import Channel
 from exfit.fitting.noise import noise_of, noise_shape
-from exfit.results.comparisons import Comparison, Match, StepFeatures
+from exfit.results.comparisons import Comparison
 
 MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger
 
@@ -44,15 +43,6 @@ def judged(
     reason = "; ".join(filter(None, reasons))
     limit = limits[validation.judging[0]]
     return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
-
-
-def without_response(setup: ExperimentSetup, fault: Exception) -> Comparison:
-    """Return a validation that the values have no response to, which is not accepted."""
-    why, record = str(fault).removeprefix(f"{setup.case}: "), setup.record
-    channels = {channel.signal: Match(nan, nan, nan) for channel in setup.channels}
-    features = StepFeatures(None, None)
-    own = Comparison(setup.name, record.source.name, nan, False, channels, features, reason=why)
-    return replace(own, validation=True, sha256=record.sha256)
 
 
 def _error_of_fit(signal: str, fitted: Sequence[Comparison]) -> float | None:

@@ -24,7 +24,7 @@ from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.fitting.system import values_of
 from exfit.models import find
 from exfit.registry import parts
-from exfit.results.acceptance import judged, without_response
+from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import (
     AsFound,
@@ -114,6 +114,8 @@ def judged_on(
         test = aligned(case, setup, values)
         return test, validation_of(case, fitted, *test)
     except SimulationError as fault:
+        from exfit.results.no_response import without_response  # what few fits need
+
         return (setup, setup.with_start_values(values)), without_response(setup, fault)
 
 

@@ -18,6 +18,7 @@ from exfit.case.load import load_case
 from exfit.case.schema import ChannelSection, StepSection
 from exfit.errors import CaseError, RecordError
 from exfit.records.record import Record
+from exfit.results.criteria import judged_by_criteria
 from exfit.util.vocabulary import Criteria, Criterion
 from exfit.workflows import fit, read_record, simulate, validate, validation_result
 
@@ -346,6 +347,9 @@ def test_a_fit_is_kept_whose_values_have_no_state_of_rest_in_another_record(tmp_
     assert unseen.reason.endswith("above VRMAX = 2.5")
     assert result.verdict.verdict == "matches, not all determined"
     assert "high is not accepted" in result.verdict.reason
+    criteria = judged_by_criteria(result)
+    assert criteria.passed is False
+    assert "on high" in criteria.sentence
     for words in (["fit", case.path, "-o", tmp_path / "run"], ["report", tmp_path / "run"]):
         done = CliRunner().invoke(cli.main, [*map(str, words)])
         assert "Warning" not in done.output

@@ -78,7 +78,8 @@ def _matches(
         yield from _in_words(match)
         if not match.overlays:
             yield Note(NO_SAMPLES, mark="faint")
-        elif match.played is not None:
+            continue
+        if match.played is not None:
             yield played(f"{key}played-{k}", match, bins)
             yield from _departures(match)
         for signal in match.overlays:
@@ -98,7 +99,8 @@ def _in_words(match: Comparison) -> Iterator[Block]:
         text += f"{number(signal.max_error, 3)} pu"
         fits = np.isfinite(signal.fit_percent)
         errors.append(text + (f", fit {percentage(signal.fit_percent)} %" if fits else ""))
-    yield Note(f"Record {match.record}: {'; '.join(errors)}.")
+    found = "; ".join(errors) if match.overlays else "no response"
+    yield Note(f"Record {match.record}: {found}.")
     if match.reason:
         yield Note(f"{match.reason}.", "verdict", "Not accepted:", "bad")
     elif match.limit is not None:
