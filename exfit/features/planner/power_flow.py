@@ -8,7 +8,15 @@ from typing import NamedTuple
 
 from exfit.errors import DynamicsError
 from exfit.features.planner.buses import Bus, Buses
-from exfit.features.planner.fields import DynamicsFault, Field, lines_of, located, number, text_of
+from exfit.features.planner.fields import (
+    WHOLE,
+    DynamicsFault,
+    Field,
+    lines_of,
+    located,
+    number,
+    text_of,
+)
 from exfit.features.planner.import_case import read_file
 from exfit.features.planner.psse import COMMENTS, read_line
 from exfit.features.start.ratings import Ratings, StepUp
@@ -67,7 +75,7 @@ def read_buses(path: Path) -> Buses:
     return {
         int(number): Bus(bus.name, bus.kv or None)
         for number, bus in buses.items()
-        if number.isdigit()
+        if WHOLE.fullmatch(number)
     }
 
 

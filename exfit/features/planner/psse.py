@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from exfit.case.case_draft import in_comment
 from exfit.features.planner.buses import NO_BUSES, Buses, numbers_of
-from exfit.features.planner.fields import DynamicsFault, Field, UnreadRecord, lines_of
+from exfit.features.planner.fields import WHOLE, DynamicsFault, Field, UnreadRecord, lines_of
 from exfit.features.planner.records import (
     PSSE,
     WIDTH,
@@ -91,7 +91,7 @@ def sound_records(text: str) -> FileRecords:
 def _unread(line: int, text: str, fields: Sequence[Field]) -> DynamicsFault:
     """Return the fault of a record: of its bus, of none, or of any if that cannot be read."""
     first = fields[0] if fields else Field("", line, quoted=True)
-    if first.text.isdecimal():
+    if WHOLE.fullmatch(first.text):
         return UnreadRecord.at(line, text, int(first.text))
     may_be = first.quoted or first.text[:1].isdecimal()
     return DynamicsFault(line, text) if may_be else UnreadRecord.at(line, text, 0)

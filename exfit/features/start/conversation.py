@@ -22,6 +22,7 @@ from exfit.features.start.questions import (
     list_rows,
     number,
     one_of,
+    place_of,
     say,
 )
 from exfit.features.start.record_files import records_among
@@ -105,8 +106,8 @@ def _record(talk: Conversation) -> str:
     files = [str(path) for path in records_among(sorted(Path().iterdir()))][:MOST_LISTED]
 
     def read(text: str) -> str:
-        file = files[int(text) - 1] if text.isdigit() and 0 < int(text) <= len(files) else text
-        return _readable(talk, file)
+        place = place_of(text, files)
+        return _readable(talk, text if place is None else files[place])
 
     list_rows({str(k): name for k, name in enumerate(files, 1)})
     return ask(

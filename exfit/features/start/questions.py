@@ -101,12 +101,18 @@ def number(text: str) -> float:
         raise ExfitError(f"{text!r} is not a number{with_point}") from None
 
 
+def place_of(text: str, words: Sequence[str]) -> int | None:
+    """Return the place of a word by its number from 1; None where the text is no such number."""
+    numbers = [*map(str, range(1, len(words) + 1))]
+    return numbers.index(text) if text in numbers else None
+
+
 def one_of(words: Sequence[str], numbered: bool = False) -> Callable[[str], str]:
     """Return what reads the beginning of a word of a list, or its number."""
 
     def read(text: str) -> str:
-        if numbered and text.isdigit() and 0 < int(text) <= len(words):
-            return words[int(text) - 1]
+        if numbered and (place := place_of(text, words)) is not None:
+            return words[place]
         begun = [word for word in words if text and word.lower().startswith(text.lower())]
         if text in words or len(begun) == 1:
             return text if text in words else begun[0]

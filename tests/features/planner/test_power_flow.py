@@ -12,7 +12,7 @@ from power_flow_files import HIGH_KV, SBASE, X, power_flow
 
 from exfit.case.load import load_case
 from exfit.errors import DynamicsError
-from exfit.features.planner.power_flow import read_power_flow
+from exfit.features.planner.power_flow import read_buses, read_power_flow
 from exfit.features.planner.psse import record_text
 from exfit.features.planner.records import definition_of
 from exfit.models.sheet import typical
@@ -92,6 +92,14 @@ def test_all_faults_of_a_file_are_named_with_line_value_and_limit(old, new, says
         read_power_flow(Path("net.raw"))
     assert says in str(raised.value)
     assert len(str(raised.value).splitlines()) == text.count(old)
+
+
+@pytest.mark.parametrize("number", ["1" * 5000, "\N{SUPERSCRIPT TWO}"])
+def test_a_bus_whose_number_is_none_has_no_name(number):
+    text = power_flow(34)
+    line = next(each for each in text.splitlines() if each.lstrip().startswith("9,"))
+    Path("net.raw").write_text(text.replace(line, line.replace("9,", f"{number},", 1)), "utf-8")
+    assert [*read_buses(Path("net.raw"))] == [1, 900]
 
 
 def test_a_heading_may_end_before_the_frequency():

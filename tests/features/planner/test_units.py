@@ -101,6 +101,7 @@ UNREADABLE = {  # whether it may be the exciter of machine 105
     "'NORTH' 'SEXS' 1 .1 10 100\n": True,
     "106 'SEXS' 1 .1 10 100\n": False,
     "#---- machines -----\n": False,
+    f"{'1' * 5000} 'SEXS' 1 .1 10 100\n": True,
     "<<<<<<< HEAD\n": False,
 }
 

@@ -14,6 +14,7 @@ from tiers import few_of
 from exfit import cli
 from exfit.case.load import load_case
 from exfit.features.start import command
+from exfit.features.start.questions import place_of
 from exfit.output import run_folder
 
 
@@ -201,3 +202,9 @@ def test_the_first_question_waits_for_no_heavy_library(folder):
     assert done.returncode == 130
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
     assert not loaded & {"scipy", "matplotlib", "rich", "jinja2", "llvmlite"}
+
+
+@pytest.mark.parametrize("text", ["\N{SUPERSCRIPT TWO}", "1" * 5000, "0", "3", "-1", "two"])
+def test_what_is_no_number_of_a_listed_word_is_no_place(text):
+    assert place_of(text, ["a.csv", "b.csv"]) is None
+    assert [place_of(number, ["a.csv", "b.csv"]) for number in ("1", "2")] == [0, 1]
