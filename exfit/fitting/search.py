@@ -37,7 +37,7 @@ from exfit.fitting.residuals import (
 from exfit.fitting.uncertainty import linearisation
 from exfit.inference.confidence import confidence
 from exfit.util.arrays import Array
-from exfit.util.text import near
+from exfit.util.text import LARGEST, near
 from exfit.util.vocabulary import (
     DEFAULT_STRATEGY,
     SEARCHES,
@@ -80,13 +80,10 @@ def fitted(
         if np.all(measured == measured[0]):
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
             raise CaseError(f"{case.path}: record: {level}: there is no step in it")
-    with np.errstate(over="ignore"):
-        errors = problem.compressed(residuals.start)
-        square = float(errors @ errors)
-    if not np.isfinite(square):
-        largest = float(np.max(np.abs(errors)))
+    largest = float(np.max(np.abs(problem.compressed(residuals.start))))
+    if not largest <= LARGEST:
         raise SimulationError(
-            f"{case.path}: the residuals at the start values are too large to be squared: "
+            f"{case.path}: the residuals at the start values are too large to be computed with: "
             f"up to {largest:.3g}; check scale, weight and start"
         )
     return setups, problem

@@ -23,7 +23,7 @@ from exfit.results.intervals.averages import averaged_residuals, unstated
 from exfit.results.intervals.value_errors import Refinement, influence_of_values
 from exfit.results.verdict import REJECTED
 from exfit.util.arrays import Array
-from exfit.util.text import digits, listed
+from exfit.util.text import LARGEST, digits, listed
 from exfit.verdict.causes import Evidence
 from exfit.verdict.causes.channels import check_zero, is_found, measured_vt0, rescaled
 from exfit.verdict.causes.trials import (
@@ -315,9 +315,9 @@ def _score(
     square = float(own @ own)
     if not square > (SAME**2) * float(direction @ direction):
         return None
-    by_bias = BIAS_KNOWN_TO * float(own @ shift)
-    by_noise = float(np.linalg.norm(spread * own))
-    by_record = hypot(by_noise, by_bias) / square
+    size = sqrt(square)
+    by_bias = BIAS_KNOWN_TO * float(own @ shift) / size
+    by_record = hypot(float(np.linalg.norm(spread * (own / size))), by_bias) / size
     change = -float(own @ linear.errors) / square
     if not held.unit and max(hypot(by_record, held.std_error), abs(change)) > LARGEST_CHANGE:
         return None
@@ -342,7 +342,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Arr
     directions = [
         (held, held.size * each)
         for held, each in zip(of_test, slopes[:, count:].T, strict=True)
-        if np.isfinite(each).all()
+        if _is_seen(each)
     ]
     place = {free.name: k for k, free in enumerate(extended.free)}
     from_record = [direction for held, direction in directions if not held.words]
@@ -360,11 +360,16 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, Iterator[tuple[Held, Arr
             for each in several:
                 by_name = [fixed[name] / sizes[place[name]] * column[name] for name in each]
                 direction = np.sum(by_name, axis=0)
-                if np.isfinite(direction).all():
+                if _is_seen(direction):
                     yield _held_value(evidence, each), direction
         yield from _of_channels(evidence, errors)
 
     return linear_model(influence, known), tested(), extended.bias
+
+
+def _is_seen(direction: Array) -> bool:
+    """Test whether what a value does is a number, and its square."""
+    return bool(np.max(np.abs(direction)) < LARGEST)
 
 
 def _at_once(together: Iterable[tuple[str, ...]], most: int) -> Iterator[list[tuple[str, ...]]]:

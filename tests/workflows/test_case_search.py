@@ -9,7 +9,7 @@ from tiers import examples_of, few_of
 import exfit
 from exfit import estimate
 from exfit.case.load import load_case
-from exfit.errors import CaseError
+from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import fitted
 from exfit.util.vocabulary import ON_FINER_GRID
@@ -48,6 +48,18 @@ def doubt(up, down=None, **settings):
         max_iterations=case.estimate.most_iterations,
     )
     return judge_of(case, problem, setups, unseen).doubt(end)
+
+
+@pytest.mark.parametrize(("weight", "refused"), [(1e99, False), (1e100, True)])
+def test_residuals_whose_squares_and_cubes_are_no_numbers_are_refused(weight, refused):
+    record = {"channels": {"vt": {"column": "vt", "weight": weight}}}
+    made = exfit.Record.from_arrays(TIME, {"vt": 9.0 * TRUTH})
+    case = exfit.Case.from_dict({**FIRST_ORDER, "record": record}, made)
+    if refused:
+        with pytest.raises(SimulationError, match="too large to be computed with: up to 1"):
+            fitted(case)
+    else:
+        assert fitted(case)
 
 
 def test_noise_and_a_validation_that_holds_leave_no_doubt():
