@@ -81,7 +81,7 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
     if not _increases(match.time):
         yield "time: does not increase"
     for signal, overlay in match.overlays.items():
-        lines = [overlay.measured, overlay.simulated, overlay.start]
+        lines = [overlay.measured, overlay.simulated, overlay.start, overlay.reference]
         if signal not in match.channels:
             yield f"overlays: {signal} is none of its channels"
         if any(line is not None and line.shape != match.time.shape for line in lines):

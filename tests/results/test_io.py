@@ -252,6 +252,7 @@ def test_what_does_not_fit_together_is_refused(saved, place, words):
         (("records", 0, "iteration_responses", "time", 3), 0.0, "time: does not increase"),
         (("records", 0, "overlays", "vt", "simulated", 2), 1e200, r"1e\+200 is beyond 1e\+150"),
         (("knowledge", "sensitivity", 0, "moved", "a", 1), -1e308, r"beyond 1e\+150"),
+        (("records", 0, "overlays", "vt", "reference"), [1.0, 1.0], "not one sample for each time"),
     ],
 )
 def test_samples_that_cannot_be_drawn_are_refused(saved, place, value, words):

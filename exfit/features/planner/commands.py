@@ -1,6 +1,7 @@
 """The commands import and export."""
 
 import os
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +39,7 @@ def _number_or_name(
     context: click.Context, option: click.Parameter, value: str | None
 ) -> int | str | None:
     """Return the number of a bus where the text is one."""
-    if value is not None and value.lstrip("-").isdecimal():
+    if value is not None and re.fullmatch("-?[0-9]+", value):
         begins = int(value[:DIGITS])  # of a longer one, out of the range too
         return int(BUSES.convert(begins, option, context))
     return value

@@ -41,6 +41,15 @@ def test_a_bus_of_more_digits_than_python_reads_is_refused(tmp_path, capsys):
     assert "is not in the range 1<=x<=999999" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["--1", "-\N{ARABIC-INDIC DIGIT ONE}", "-"])
+def test_what_is_no_number_is_the_name_of_a_bus(name, capsys):
+    Path("unit.dyr").write_text(SOUND)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["import", "unit.dyr", "--bus", name], prog_name="exfit")
+    assert ended.value.code == 1
+    assert f"unit.dyr: no record of bus {name!r}" in capsys.readouterr().err
+
+
 @pytest.fixture(autouse=True)
 def workplace(empty_folder):
     """Work in a folder that holds nothing but unit.dyr."""
