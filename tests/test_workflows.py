@@ -208,7 +208,7 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("module", "step"), [(determination, "uncertainty_of_solution"), (fit_run, "validation_of")]
+    ("module", "step"), [(determination, "uncertainty_of_solution"), (fit_run, "judged_on")]
 )
 def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, module, step):
     def interrupt(*_):

@@ -25,7 +25,7 @@ ROWS = {row.symbol: row for row in MODELS["AC1A"].sheet}
         ("TE", (0.01, inf)),
         ("TA", (SHORTEST, inf)),
         ("VRMAX", (-9999.0, 9999.0)),
-        ("SE1", (0.0, 100.0)),
+        ("SE1", (0.0, 1000.0)),
     ],
 )
 def test_a_missing_bound_is_the_limit_of_the_equations(name, bounds):
