@@ -52,6 +52,7 @@ Values = Mapping[str, float]
 Watch = Callable[[estimate.Progress], None]
 
 LARGEST_STEP = 0.5  # pu: beyond it no voltage is left
+SMALLEST_STEP = 1e-6  # pu: below it the response is rounding
 HARDLY_MORE = 0.5  # % of the step: what a plainer set of values may cost
 NOTICEABLE = 1e-3  # of the step, rms: a change of the responses that a study would not see
 REACH = 10.0  # times the copied and the typical value: how far the search goes
@@ -98,8 +99,9 @@ def translate(
     if not isinstance(result, FitResult):
         result = load_result(result)
     for size in steps:
-        if not 0.0 < abs(size) <= LARGEST_STEP:
-            raise ExfitError(f"step: {size:g} pu: must be above 0 and at most {LARGEST_STEP:g}")
+        if not SMALLEST_STEP <= abs(size) <= LARGEST_STEP:
+            limits = f"{SMALLEST_STEP:g} ... {LARGEST_STEP:g}"
+            raise ExfitError(f"step: {size:g} pu: lies outside {limits}")
     target = target_model(model)
     began = clock.perf_counter()
     task = translation_task(result, target, steps)

@@ -79,7 +79,7 @@ def test_a_result_with_a_machine_that_is_none_is_refused(run, fitted):
     ("arguments", "text"),
     [
         (["--model", "EXAC9"], "EXAC9 is not in the catalogue"),
-        (["--model", "EXAC1", "--step", "3"], "step: 3 pu: must be above 0 and at most 0.5"),
+        (["--model", "EXAC1", "--step", "3"], "step: 3 pu: lies outside 1e-06 ... 0.5"),
     ],
 )
 def test_what_is_wrong_is_refused(run, fitted, arguments, text):

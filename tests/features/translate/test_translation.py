@@ -244,9 +244,9 @@ def test_what_is_no_exciter_is_refused(fit, model, text):
         exfit.translate(fit, model)
 
 
-@pytest.mark.parametrize("size", [0.0, 0.6, float("nan")])
+@pytest.mark.parametrize("size", [0.0, 5e-324, 0.6, float("nan")])
 def test_steps_that_are_none_are_refused(size):
-    with pytest.raises(ExfitError, match=r"step: .* pu: must be above 0 and at most 0.5"):
+    with pytest.raises(ExfitError, match=r"step: .* pu: lies outside 1e-06 [.]{3} 0.5"):
         translated("AC1A", "EXAC1", steps=(size,))
 
 
