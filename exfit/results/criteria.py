@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from exfit.results.validation_result import Reported
 
 NOT_REACHED = "the simulated response does not show it"
-NONE = "there is no response"
+SILENT = "there is no response"
 OF_SAMPLES: Mapping[str, Callable[[Array], float]] = {
     "rms": lambda error: float(np.sqrt(np.mean(error**2))),
     "largest": lambda error: float(error[np.argmax(np.abs(error))]),
@@ -99,9 +99,9 @@ def judged_by_criteria(result: "Reported") -> CriteriaVerdict:
         (
             *(each for match in matches for each in match.criteria),
             *(
-                JudgedCriterion(silent.name, "rms", silent.judged_by, outcome="not met", why=NONE)
-                for silent in matches
-                if not silent.overlays
+                JudgedCriterion(each.name, "rms", each.judged_by, outcome="not met", why=SILENT)
+                for each in matches
+                if not each.overlays
             ),
             *(
                 JudgedCriterion("", row.quantity, signal, outcome="not judged", why=why)

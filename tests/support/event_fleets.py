@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from coverage_cases import about_given
+from event_sets import driven
 from pmu_records import degrees, stamps, write_table
 from power_flow_files import HIGH_KV, power_flow
 
@@ -23,9 +24,7 @@ from exfit.features.planner.import_case import imported_case
 from exfit.features.planner.psse import record_text
 from exfit.features.planner.records import contradictions, definition_of
 from exfit.features.planner.units import read_unit
-from exfit.fitting.build import plain_simulator
 from exfit.fitting.experiment import with_enough_substeps
-from exfit.simulation.inputs import SplinedInput
 
 SEED, FIRST_BUS = 3301, 201
 EVENTS = 12
@@ -298,17 +297,16 @@ def response(parts, event, x, random, folder):
         case = load_case(path)
     except ExfitError:  # it cannot give this power
         return None
-    values = case.values()
-    simulator, levels = plain_simulator(case, values)
-    time = simulator.times
-    moved = dict(zip(("E", "angle"), event.moves(time, share), strict=True))
-    inputs = {name: SplinedInput(time, course) for name, course in moved.items()}
-    simulator = simulator.remade(inputs=replace(simulator.inputs, steps=(), recorded=inputs))
+
+    def moves(time):
+        return dict(zip(("E", "angle"), event.moves(time, share), strict=True))
+
+    simulator, values, moved = driven(case, moves)
     try:
-        simulator = with_enough_substeps(simulator, {**values, **levels}, path)
+        simulator = with_enough_substeps(simulator, values, path)
     except SimulationError:
         return None
-    shown = simulator.response({**values, **levels}).signals
+    time, shown = simulator.times, simulator.response(values).signals
     vt, p, q = shown["vt"], shown["p"], shown["q"]
     late = time > event.seconds - 4.0
     first = (time > REST) & (time < REST + 4.0)

@@ -45,6 +45,19 @@ COURSES = (
 )
 
 
+def driven(case, moves):
+    """Return a simulator of a case whose source moves by smooth courses, with its values and those.
+
+    ``moves`` returns the courses (M,) by their signals at times (M,), s; no table is as smooth.
+    """
+    values = case.values()
+    simulator, levels = plain_simulator(case, values)
+    moved = moves(simulator.times)
+    inputs = {name: SplinedInput(simulator.times, course) for name, course in moved.items()}
+    simulator = simulator.remade(inputs=replace(simulator.inputs, steps=(), recorded=inputs))
+    return simulator, {**values, **levels}, moved
+
+
 def recorded(folder, exciter="EXST1", noise=2e-4, seed=1, lengths=LENGTHS):
     """Write the records of so many events; p and q are of the base of the machine."""
     rng = np.random.default_rng(seed)
@@ -64,18 +77,17 @@ def recorded(folder, exciter="EXST1", noise=2e-4, seed=1, lengths=LENGTHS):
         }  # fmt: skip
         file = folder / f"truth{number}.yaml"
         file.write_text(yaml.safe_dump(content))
-        case = load_case(file)
-        values = case.values()
-        simulator, levels = plain_simulator(case, values)
-        moved = np.radians(angle_at(simulator.times, *course))  # smooth, as no table of it is
-        inputs = {"angle": SplinedInput(simulator.times, moved)}
-        simulator = simulator.remade(inputs=replace(simulator.inputs, steps=(), recorded=inputs))
-        response = simulator.response({**values, **levels})
+
+        def moves(time, course=course):
+            return {"angle": np.radians(angle_at(time, *course))}
+
+        simulator, values, moved = driven(load_case(file), moves)
+        response = simulator.response(values)
         keep = slice(None, None, round(240.0 / RATE))
         at = response.time[keep]
         vt, p, q = (response.signals[name][keep] for name in ("vt", "p", "q"))
         source = vt - (LINE["R"] + 1j * LINE["X"]) * (p - 1j * q) / vt
-        phase = moved[keep] - np.angle(source)
+        phase = moved["angle"][keep] - np.angle(source)
         columns = [at, vt, np.unwrap(phase), p, q]
         for column in (1, 3, 4):
             columns[column] = columns[column] + noise * rng.standard_normal(len(at))

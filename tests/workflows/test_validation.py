@@ -350,8 +350,10 @@ def test_a_fit_is_kept_whose_values_have_no_state_of_rest_in_another_record(tmp_
     criteria = judged_by_criteria(result)
     assert criteria.passed is False
     assert "on high" in criteria.sentence
-    for words in (["fit", case.path, "-o", tmp_path / "run"], ["report", tmp_path / "run"]):
+    run = tmp_path / "run"
+    for code, words in ((3, ["fit", case.path, "-o", run]), (0, ["report", run])):
         done = CliRunner().invoke(cli.main, [*map(str, words)])
+        assert done.exit_code == code
         assert "Warning" not in done.output
         assert done.exception is None or isinstance(done.exception, SystemExit)
     assert (tmp_path / "run" / "report.html").exists()

@@ -373,7 +373,7 @@ def test_errors_are_those_as_recorded_and_only_their_derivatives_without_noise(f
 
 
 def test_a_misfit_is_not_taken_for_noise_of_what_drives(folder, event):
-    """Errors of a hundred times their noise would say that vt was of tens of pu."""
+    """As noise, errors of 1e5 times theirs would say that vt was of tens of pu."""
     setups, problem = fitted_of(load_case(event_case(folder, "event")))
     residuals, theta = problem.residuals, problem.residuals.start
     white = input_noise.whitened(residuals, setups, theta)
