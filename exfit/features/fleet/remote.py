@@ -17,10 +17,11 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import chdir, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from threading import Lock, Semaphore, Timer
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -110,39 +111,49 @@ def bundle_of(paths: Sequence[Path]) -> Bundle:
 
 
 @contextmanager
-def laid_out(bundle: Bundle, within: Path | None = None) -> Iterator[Path]:
-    """Lay the files out in a temporary folder; the process reads them by the user's paths inside.
+def laid_out(bundle: Bundle, within: Path) -> Iterator[Path]:
+    """Lay the files out for this process, which reads them by the user's paths inside.
 
-    The temporary folder is ``within`` another, or where the system has such.
-
-    Gives the path of the case as the user gave it. For the time it lasts the folder stands for the
-    root of all paths that cases name, and the current folder is that of the user below it: no other
-    thread of the process may read cases meanwhile. Raises ExfitError where the files cannot be
-    written, or where one arrived damaged.
+    Gives the path of the case as the user gave it. For the time it lasts a folder ``within``
+    another, which is that of all cases of the process and is emptied first, stands for the root of
+    all paths that cases name, and the current folder is that of the user below it: no other thread
+    of the process may read cases meanwhile. Raises ExfitError where the files cannot be written, or
+    where one arrived damaged.
     """
-    if within is not None:
-        within.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix="exfit-", dir=within, ignore_cleanup_errors=True) as temporary:
-        root = Path(temporary).resolve()
+    try:
+        root = _own_folder(within)
+        _remove_files(root)
         working = below(root, Path(bundle.folder))
-        contents = {below(root, Path(file.path)): file.unpacked() for file in bundle.files}
-        try:
-            working.mkdir(parents=True, exist_ok=True)
-            for place, content in contents.items():
-                place.parent.mkdir(parents=True, exist_ok=True)
-                place.write_bytes(content)
-        except OSError as fault:
-            raise ExfitError(f"temporary folder of the worker: {fault.strerror}") from None
-        former_root = os.environ.get(ROOT)
-        try:
-            os.environ[ROOT] = str(root)
-            with chdir(working):
-                yield Path(bundle.case)
-        finally:
-            if former_root is None:
-                del os.environ[ROOT]
-            else:
-                os.environ[ROOT] = former_root
+        working.mkdir(parents=True, exist_ok=True)
+        for file in bundle.files:
+            place = below(root, Path(file.path))
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(file.unpacked())
+    except OSError as fault:
+        raise ExfitError(f"temporary folder of the worker: {fault.strerror}") from None
+    former_root = os.environ.get(ROOT)
+    try:
+        os.environ[ROOT] = str(root)
+        with chdir(working):
+            yield Path(bundle.case)
+    finally:
+        if former_root is None:
+            del os.environ[ROOT]
+        else:
+            os.environ[ROOT] = former_root
+
+
+@cache
+def _own_folder(within: Path) -> Path:
+    within.mkdir(parents=True, exist_ok=True)
+    return Path(mkdtemp(prefix="exfit-", dir=within)).resolve()
+
+
+def _remove_files(root: Path) -> None:
+    """Remove all files and links below a root; its folders are mostly those of the next case."""
+    for path in [*root.rglob("*")]:
+        if path.is_symlink() or not path.is_dir():
+            path.unlink()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +161,7 @@ class BundledTask(CaseTask):
     """A case with its files, which are laid out ``temporary``, in a folder of the worker."""
 
     bundle: Bundle
-    temporary: Path | None = None
+    temporary: Path = Path()
 
     @classmethod
     def of(cls, task: CaseTask) -> "BundledTask":
@@ -281,6 +292,7 @@ class Seats:
                 self._reply(case, remote.limit, is_wanted) for case in remote.cases if is_wanted()
             )
         finally:
+            self._leave_later()
             self.free.release()
 
     def _reply(self, case: PlannedCase, limit: float, is_wanted: Callable[[], bool]) -> Reply:
@@ -296,8 +308,6 @@ class Seats:
             if self.stopped:
                 raise NoProcess("the batch has ended")
             seat = self.idle.pop() if self.idle else None
-            if self.leaving is not None:
-                self.leaving.cancel()
         seat = seat or Seat.taken()
         with self.lock:
             self.busy.add(seat)
@@ -310,9 +320,15 @@ class Seats:
                 self.busy.discard(seat)
                 if not seat.ended:
                     self.idle.append(seat)
-                    self.leaving = Timer(0.0 if self.stopped else IDLE, self._leave)
-                    self.leaving.daemon = True
-                    self.leaving.start()
+
+    def _leave_later(self) -> None:
+        """Let idle processes end after a while without a case, at once where the batch has."""
+        with self.lock:
+            if self.leaving is not None:
+                self.leaving.cancel()
+            self.leaving = Timer(0.0 if self.stopped else IDLE, self._leave)
+            self.leaving.daemon = True
+            self.leaving.start()
 
     def _leave(self) -> None:
         """End the processes that have had nothing to do for long."""

@@ -59,7 +59,7 @@ def travelled(user, case, run):
         (user / folder).rename(user / f"{folder}-gone")
     try:
         os.chdir(user / "elsewhere")
-        with laid_out(bundle) as path:
+        with laid_out(bundle, user) as path:
             assert str(path) == str(case)
             return run(path)
     finally:
@@ -157,10 +157,26 @@ def test_what_lies_at_the_same_path_on_the_workers_own_disk_is_not_read(user):
     path = case_file("a.yaml", there)
     bundle = bundle_of_case(path)  # the record does not exist yet
     there.write_text(TEXT)
-    with laid_out(bundle) as laid, pytest.raises(ExfitError, match=r"bump.csv: cannot be read"):
+    with (
+        laid_out(bundle, user) as laid,
+        pytest.raises(ExfitError, match=r"bump.csv: cannot be read"),
+    ):
         exfit.fit(laid)
     assert ROOT not in os.environ
     exfit.fit(path)
+
+
+def test_a_case_finds_no_file_of_the_one_before(user):
+    path = case_file("a.yaml")
+    with laid_out(bundle_of_case(path), user / "worker"):
+        Path("left.csv").write_text(TEXT)
+        Path("records").symlink_to(user / "records")
+        Path("../records/of.csv").symlink_to(user / "records" / "bump.csv")
+    (user / "records" / "bump.csv").rename(user / "kept.csv")
+    with laid_out(bundle_of_case(path), user / "worker"):
+        assert [file.name for file in Path.cwd().rglob("*")] == ["a.yaml"]
+        assert not [*Path("../records").iterdir()]
+    assert (user / "kept.csv").read_text() == TEXT
 
 
 def test_bytes_that_change_on_the_way_are_refused(user):
@@ -171,7 +187,7 @@ def test_bytes_that_change_on_the_way_are_refused(user):
             others[at] = replace(file, content=content)
             with (
                 pytest.raises(ExfitError, match=r"damaged on its way"),
-                laid_out(replace(bundle, files=tuple(others))),
+                laid_out(replace(bundle, files=tuple(others)), user),
             ):
                 pass
 
@@ -203,5 +219,8 @@ def test_a_file_that_cannot_be_read_is_refused_where_it_lies(user):
     with pytest.raises(ExfitError, match=r"records: cannot be read: Is a directory"):
         bundle_of_case(case_file("a.yaml", "../records"))
     missing = bundle_of_case(Path("none.yaml"))
-    with laid_out(missing) as path, pytest.raises(CaseError, match=r"none.yaml: cannot be read"):
+    with (
+        laid_out(missing, user) as path,
+        pytest.raises(CaseError, match=r"none.yaml: cannot be read"),
+    ):
         exfit.fit(path)
