@@ -83,6 +83,7 @@ def content(free, search="local", record="event.csv"):
             "free": {name: own for name, own in sections.items() if "." not in name},
         },
         "estimate": {"search": search},
+        "given": "exact",
     }  # fmt: skip
 
 

@@ -22,7 +22,8 @@ from exfit.models.sheet import (
 )
 
 # a dead band and a valve's curve, which the model does not have
-NOT_MODELLED = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5 GV6 PGV6"
+WITHOUT = "DB1 EPS DB2 GV1 PGV1 GV2 PGV2 GV3 PGV3 GV4 PGV4 GV5 PGV5"
+NOT_MODELLED = f"{WITHOUT} GV6 PGV6"
 CONS = "K T1 T2 T3 UO UC PMAX PMIN T4 K1 K2 T5 K3 K4 T6 K5 K6 T7 K7 K8"
 LOW_PRESSURE = dict.fromkeys(["K2", "K4", "K6", "K8"], 0.0)  # shares of a second machine
 SECOND_MACHINE = {"JBUS": 0, "M": 0}  # there is none, and M, its id, says nothing
@@ -93,10 +94,18 @@ IEEEG1 = governor(
         *BAND,
     ),
     "V1 VALVE V4 V5 V6 V7",
-    aliases="IEEEG1D",
+    aliases="IEEEG1D WSIEG1",
     records=(
         *record("IEEEG1", CONS, icons=SECOND_MACHINE, absent=LOW_PRESSURE, ignored="M", held=PLAIN),
         *with_band("IEEEG1", CONS, icons=SECOND_MACHINE, absent=LOW_PRESSURE, ignored="M"),
+        *record(
+            "WSIEG1",
+            f"{CONS} {WITHOUT} IBLOCK",
+            icons={**SECOND_MACHINE, "IBLOCK": 0},
+            absent={**LOW_PRESSURE, **dict.fromkeys(WITHOUT.split(), 0.0)},
+            ignored="M",
+            held=PLAIN,
+        ),
     ),
     pslf_records=record(
         "ieeeg1",

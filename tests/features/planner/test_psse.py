@@ -515,7 +515,8 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         given = [value for name, value in of_icons.items() if name not in record.cons]
         absent = dict(record.absent)
         absent = {name: value - 1 if value > 1 else value + 1 for name, value in absent.items()}
-        given += [absent.get(name, values[name]) for name in record.cons]
+        others = {**of_icons, **values, **absent}
+        given += [others[name] for name in record.cons]
         text = f"1 {record.name} 1 " + " ".join(map(repr, given)) + " /"
         read = read_back(definition, text)
         told = "\n".join(warning.text for warning in read.warnings)
