@@ -126,8 +126,6 @@ def fit_result(
         pace=pace,
     )
     verdict = verdict_of(evidence)
-    if given:
-        analysis.allow_for_misfit(residuals, values, verdict.explained)
     uncertainty = _holding_causes(analysis.uncertainty, residuals, values, verdict)
     analysis.uncertainty = uncertainty
     noted = _minima_notes(state, minima, uncertainty)
@@ -182,7 +180,7 @@ def fit_result(
             *noted,
             *_notes(state, comparisons, analysis),
             *_refined_notes(refined),
-            *filter(None, [analysis.twice, pace.sentence]),
+            *filter(None, [pace.sentence]),
         ),
         validation=tuple(analysis.validation),
         versions=versions(),
@@ -257,19 +255,6 @@ class Analysis:
     windows: WindowSpread | None = None
     averages: RecorderAverages | None = None
     errors: ErrorsOfValues | None = None
-    acting: tuple[str, ...] = ()
-    twice: str = ""
-
-    def allow_for_misfit(self, residuals: Residuals, values: Values, explained: bool) -> None:
-        """Allow for what the model does not show of an event with all given values fitted."""
-        if self.uncertainty is None or self.errors is None:
-            return
-        from exfit.results.intervals import misfit
-
-        self.twice = misfit.why_counted_twice(self.acting, explained)
-        if self.twice:
-            self.errors = misfit.counted_twice(self.errors)
-            self.uncertainty = misfit.allowing_for_misfit(self.uncertainty, residuals, values)
 
     @property
     def why(self) -> str:
@@ -365,16 +350,17 @@ def _analysed(
             noises = uncertainty.confidence.noise
             errors = errors_of_values(case, problem, best.x, noises, fine, state.refined)
             analysis.errors = errors
-            if state.refined.given:
-                from exfit.results.intervals.misfit import acting_limits
-
-                analysis.acting = acting_limits(fine, values)
             if case.kind.plays_back and not case.kind.has_exciter:
                 from exfit.results.intervals.windows import spread_over_windows, with_spread
 
                 windows = spread_over_windows(case, fine, problem.residuals, values, uncertainty)
                 analysis.windows, uncertainty = windows, with_spread(uncertainty, windows)
             uncertainty = allowing_for(errors, uncertainty, *at)
+            if state.refined.given:
+                from exfit.results.intervals import many_values
+
+                analysis.errors = many_values.errors_beyond_linear(errors)
+                uncertainty = many_values.beyond_linear(uncertainty, problem.residuals, values)
             averages = recorder_averages(case, problem.residuals, best.x, uncertainty)
             analysis.averages = averages
             uncertainty = allowing_for_averages(uncertainty, problem.residuals, averages)

@@ -11,7 +11,7 @@ from exfit import Record
 from exfit.case.case import Case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import GivenError, uncertainty_at
-from exfit.results.intervals.misfit import allowing_for_misfit, counted_twice
+from exfit.results.intervals.many_values import LARGER, beyond_linear, errors_beyond_linear
 from exfit.results.intervals.value_errors import (
     ErrorsOfValues,
     allowing_for,
@@ -202,18 +202,20 @@ def test_a_fit_says_for_which_errors_it_allows_and_keeps_them(tmp_path):
     assert read.parameters["k"].interval == result.parameters["k"].interval
 
 
-def test_what_is_left_of_an_event_beyond_noise_counts_every_side_twice():
+def test_errors_of_many_values_are_larger_than_by_linear_theory_on_both_sides():
     case = first_order()
     problem, theta = minimum(case)
     values = problem.residuals.values(theta)
     uncertainty = uncertainty_at(problem, theta, ())
     own = uncertainty.confidence.parameters["k"]
-    twice = allowing_for_misfit(uncertainty, problem.residuals, values).confidence.parameters["k"]
+    larger = beyond_linear(uncertainty, problem.residuals, values).confidence.parameters["k"]
     at = values["k"]
-    assert twice.std_error == pytest.approx(2.0 * own.std_error)
-    assert [end - at for end in twice.interval] == pytest.approx(
-        [2.0 * (end - at) for end in own.interval]
+    assert larger.std_error == pytest.approx(LARGER * own.std_error)
+    assert [end - at for end in larger.interval] == pytest.approx(
+        [LARGER * (end - at) for end in own.interval]
     )
-    assert twice.by_noise == own.interval
-    errors = counted_twice(ErrorsOfValues({}, {}, sides={"a": (1.0, 2.0)}, left={"a": 0.5}))
-    assert (errors.sides, errors.left) == ({"a": (2.0, 4.0)}, {"a": 1.0})
+    assert larger.by_noise == own.interval
+    errors = ErrorsOfValues({}, {}, sides={"a": (1.0, 2.0)}, left={"a": 0.5})
+    errors = errors_beyond_linear(errors)
+    assert errors.sides["a"] == pytest.approx((LARGER, 2.0 * LARGER))
+    assert errors.left["a"] == pytest.approx(0.5 * LARGER)
