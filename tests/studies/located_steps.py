@@ -138,7 +138,7 @@ def derivatives(models):
     """Print how far derivatives are from differences, for each kind of test."""
     for kind in KINDS:
         found, refused = [], []
-        for model in models or models_of(kind):
+        for model in (own for own in models_of(kind) if own in models or not models):
             for scenario in (one for one in scenarios(model, kind) if one.narrowed):
                 try:
                     found += [
@@ -148,7 +148,7 @@ def derivatives(models):
                     refused.append(f"{scenario.name}: {fault}")
         known = [entry for entry in found if entry[1] < 1.0]
         beyond = sorted((entry for entry in known if entry[0] > ALIKE), reverse=True)
-        largest = max(off for off, *_ in known)
+        largest = max((off for off, *_ in known), default=0.0)
         print(f"{kind}: {len(known)} derivatives, largest difference {largest:.1e}")
         print(
             "\n".join([f"above {ALIKE:g}: {len(beyond)}", *(f"{o:.1e} {n}" for o, _, n in beyond)])
@@ -161,7 +161,7 @@ def derivatives(models):
 def main(models):
     for kind in KINDS:
         errors, steps, refused, unknown = [], Counter(), [], []
-        for model in models or models_of(kind):
+        for model in (own for own in models_of(kind) if own in models or not models):
             for scenario in scenarios(model, kind):
                 try:
                     error, step, apart = error_of(scenario)
@@ -176,7 +176,8 @@ def main(models):
                 if error > ACCURACY:
                     print(f"{scenario.name}: {error:.1e} at {step:g} s; grids {apart:.0e} apart")
         shares = ", ".join(f"{1e3 * step:g} ms {count}" for step, count in sorted(steps.items()))
-        print(f"{kind}: {len(errors)} scenarios, largest error {max(errors):.1e} pu ({shares})")
+        largest = max(errors, default=0.0)
+        print(f"{kind}: {len(errors)} scenarios, largest error {largest:.1e} pu ({shares})")
         print("\n".join([f"refused: {len(refused)}", *refused]))
         print("\n".join([f"without a reference: {len(unknown)}", *unknown]))
 
