@@ -75,7 +75,8 @@ def rounding_waves(levels: Array, step: float, noise: float) -> Array:
     """
     k = np.arange(1, MOST_WAVES + 1)
     variances = (step / (np.pi * k)) ** 2 / 2.0 * np.exp(-((2.0 * np.pi * k * noise / step) ** 2))
-    k, variances = (part[variances > NEGLIGIBLE * step**2 / 12.0] for part in (k, variances))
+    large = variances > NEGLIGIBLE * step**2 / 12.0
+    k, variances = k[large], variances[large]
     angles = 2.0 * np.pi * levels[:, None] / step * k
     waves = np.hstack([np.cos(angles), np.sin(angles)])
     return np.asarray(waves * np.tile(np.sqrt(variances), 2))

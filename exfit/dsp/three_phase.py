@@ -110,7 +110,7 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
         )
     step = even_step(time, "the phasor of a waveform")
     clock: Array = step * np.arange(len(time), dtype=np.float64)
-    vector: Complex = phases @ SPACE_VECTOR
+    vector: Complex = np.asarray(phases @ SPACE_VECTOR, dtype=np.complex128)
     frequency = _frequency(clock, vector)
     _check_frequency(frequency, step, len(time), cycles)
     # once more from what is left when the ripple is gone

@@ -45,7 +45,8 @@ def address(array: NDArray[Any], kind: type = np.float64) -> int:
     if array.dtype != kind or not flags.c_contiguous:
         raise TypeError(f"the kernel takes C-contiguous arrays of {kind.__name__}")
     if flags.writeable:  # takes a third of the time
-        return ctypes.addressof(NO_BYTES.from_buffer(array))  # type: ignore[arg-type]
+        buffer: Any = array
+        return ctypes.addressof(NO_BYTES.from_buffer(buffer))
     return int(array.__array_interface__["data"][0])
 
 

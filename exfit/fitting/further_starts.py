@@ -143,7 +143,8 @@ def telling_form(residuals: Residuals) -> Residuals:
 
     def told(some: Iterable[int]) -> Array:
         """Share of each direction that some records tell, as far as it is needed."""
-        return np.minimum(np.linalg.eigvalsh(sum(shares[k] for k in some)), TOLD)
+        whole = np.sum([shares[k] for k in some], axis=0)
+        return np.asarray(np.minimum(np.linalg.eigvalsh(whole), TOLD))
 
     kept = list[int]()
     while not kept or np.min(told(kept)) < TOLD:

@@ -35,9 +35,10 @@ def read(kind: Any, data: Any, place: Place = ()) -> Any:
 
     Raises FormError, which begins with the place, where data has another form.
     """
+    kind = _without_alias(kind)
     origin, args = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        if get_origin(args[0]) is np.ndarray:
+        if get_origin(_without_alias(args[0])) is np.ndarray:
             return _array(data, place, args[1])
         return args[1] if data is None else read(args[0], data, place)
     if origin in (Union, UnionType):
@@ -56,6 +57,12 @@ def read(kind: Any, data: Any, place: Place = ()) -> Any:
     if has_entries(kind):
         return _entries(kind, data, place)
     return _scalar(kind, data, place)
+
+
+def _without_alias(kind: Any) -> Any:
+    """Return what an alias with parameters stands for, such as the NDArray of NumPy 2.5."""
+    stands_for = getattr(get_origin(kind), "__value__", None)
+    return kind if stands_for is None else stands_for[get_args(kind)]
 
 
 def _tuple(kinds: tuple[Any, ...], data: Any, place: Place) -> tuple[Any, ...]:

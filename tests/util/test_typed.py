@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
 from exfit.util.typed import IN_FILE, KEY, plain
 from exfit.util.typed_reading import FormError, read
@@ -135,3 +136,12 @@ def test_a_whole_number_too_large_for_a_double_is_no_number(key):
 
 def test_whole_numbers_are_numbers():
     assert read(Whole, {**data(), "long": [1, 2.5, None]}).long[:2].tolist() == [1.0, 2.5]
+
+
+def test_an_alias_is_read_as_what_it_stands_for_as_newer_interpreters_have_them():
+    scalar = TypeVar("scalar", bound=np.generic)
+    array = np.ndarray[tuple[int, ...], np.dtype[scalar]]
+    alias = TypeAliasType("alias", array, type_params=(scalar,))
+    assert read(alias[np.float64], [1.0, 2.0]).tolist() == [1.0, 2.0]
+    assert read(Annotated[alias[np.float64], inf], [None]).tolist() == [inf]
+    assert read(alias[np.complex128], {"real": [1.0], "imag": [2.0]}).tolist() == [1.0 + 2.0j]

@@ -24,7 +24,7 @@ HOURS_NEEDED = ", hours and minutes; minutes and seconds need their hours"
 CENTURY = 2000  # of a year in two digits
 EITHER = "dmy or mdy"  # order of a date whose first two parts may be either
 TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
-MONTHS_A_YEAR = 12
+MONTHS_A_YEAR, A_MONTH = 12, np.timedelta64(1, "M")
 
 
 class StampError(ValueError):
@@ -193,7 +193,7 @@ def _valid_days(year: Whole, month: Whole, day: Whole) -> Whole:
     wrong = (month < 1) | (month > 12) | (day < 1)
     months = ((year - 1970) * 12 + np.where(wrong, 1, month) - 1).astype("datetime64[M]")
     first = months.astype("datetime64[D]").astype(np.int64)
-    length = (months + 1).astype("datetime64[D]").astype(np.int64) - first
+    length = (months + A_MONTH).astype("datetime64[D]").astype(np.int64) - first
     wrong |= day > length
     if wrong.any():
         row = int(wrong.argmax())
