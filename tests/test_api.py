@@ -87,7 +87,7 @@ def test_input_that_cannot_be_used_raises_an_exfit_error(tmp_path):
 def test_the_callback_of_a_fit_is_called_with_every_iteration():
     iterations = []
     result = exfit.fit(CASE, search="local", progress=iterations.append)
-    assert tuple(iterations) == result.history
+    assert [*map(vars, iterations)] == [*map(vars, result.history)]
     assert [iteration.number for iteration in iterations] == list(range(len(iterations)))
 
 

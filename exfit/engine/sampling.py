@@ -34,7 +34,7 @@ ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")
 CACHE_LINE = 8  # numbers: what a vector is read from begins at a multiple
 MOST_KEPT = 1 << 23  # numbers (64 MB) of a scratch buffer that is used again
 KINDS = {"p": ctypes.c_void_p, "i": ctypes.c_int64, "d": ctypes.c_double}
-NO_BYTES = ctypes.c_char * 0
+NO_BYTES: Any = ctypes.c_char * 0
 
 _scratch = threading.local()  # new pages for every run would cost a fifth of it
 
@@ -45,8 +45,7 @@ def address(array: NDArray[Any], kind: type = np.float64) -> int:
     if array.dtype != kind or not flags.c_contiguous:
         raise TypeError(f"the kernel takes C-contiguous arrays of {kind.__name__}")
     if flags.writeable:  # takes a third of the time
-        buffer: Any = array
-        return ctypes.addressof(NO_BYTES.from_buffer(buffer))
+        return ctypes.addressof(NO_BYTES.from_buffer(array))
     return int(array.__array_interface__["data"][0])
 
 
