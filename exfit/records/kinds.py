@@ -143,7 +143,7 @@ def _by_what_moves(record: "Inspection", signals: Mapping[str, Array]) -> KindOf
     if _swings(record, signals):
         return KindOfTest(EVENT, f"{names['p']} moves more than {names['q']}, as behind a loss")
     lasts = any(names.get("vt") in step.sizes for step in record.steps)
-    if together > CERTAINLY and (lasts or "angle" not in signals):
+    if together > CERTAINLY and (lasts or not _turns(signals)):
         return KindOfTest(BUMP, f"{names['q']} moves with {names['vt']}: {BY_REFERENCE}")
     on_load = bool({"p", "q"} & signals.keys())
     if record.steps and "vt" in signals and not on_load:
@@ -178,13 +178,20 @@ def _by_frequency(
 ) -> KindOfTest | None:
     """Suppose a grid event where a frequency or an angle moves and nothing else is known."""
     moved = _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
-    if on_load and "vt" in signals and ("angle" in signals or moved > OF_GRID):
+    if on_load and "vt" in signals and _turns(signals):
         why = f"{names.get('angle') or names['frequency']} moves with the power"
         return KindOfTest(EVENT, f"{why}; or is it a bump test? {_lacking(names)}".strip())
     if moved > OF_GRID and not on_load and not {*FIELDS} & signals.keys():
         why = f"{names['frequency']} moves by {moved:.2g} pu"
         return KindOfTest(EVENT, f"{why}; or is it a bump test?")
     return None
+
+
+def _turns(signals: Mapping[str, Array]) -> bool:
+    """Whether an angle was recorded, or a frequency that moves as that of a grid."""
+    return "angle" in signals or (
+        "frequency" in signals and _range_pu(signals["frequency"]) > OF_GRID
+    )
 
 
 def _lacking(names: Mapping[str, str]) -> str:

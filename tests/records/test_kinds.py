@@ -1,4 +1,4 @@
-"""Which test of a governor a record holds, by what moves in it and what moves first."""
+"""Which test a record holds, by what moves in it and what moves first."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,15 @@ from places import SAMPLES
 
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.records.kinds import FOLLOWING, INJECTION, ISOLATED_LOAD, OF_GOVERNOR, REFERENCE
+from exfit.records.kinds import (
+    BUMP,
+    EVENT,
+    FOLLOWING,
+    INJECTION,
+    ISOLATED_LOAD,
+    OF_GOVERNOR,
+    REFERENCE,
+)
 
 TIME = np.arange(0.0, 60.0, 0.1)
 NOISE = {"speed": 3e-5, "p": 1e-3, "gate": 1e-3, "vt": 2e-4}
@@ -53,3 +61,11 @@ def test_a_step_of_the_voltage_reference_is_no_test_of_the_governor():
     found = kind(vt=1.0 + 0.03 * after(0.5), p=0.6 + 0.02 * kick, gate=np.full_like(TIME, 0.6),
                  speed=1.0 + 1e-4 * kick)  # fmt: skip
     assert found.name not in OF_GOVERNOR
+
+
+@pytest.mark.parametrize(("size", "name"), [(1e-4, BUMP), (6e-4, EVENT)])
+def test_where_q_swings_with_the_voltage_and_no_step_lasts_the_frequency_tells(size, name):
+    swing = after(0.2) * np.exp(-0.2 * TIME) * np.sin(5.0 * TIME) / np.exp(-2.0)
+    found = kind(vt=1.0 + 0.01 * swing, q=0.1 + 0.03 * swing, p=0.6 + 0.02 * swing,
+                 frequency=60.0 * (1.0 + size * swing))  # fmt: skip
+    assert found.name == name
