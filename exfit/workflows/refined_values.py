@@ -1,6 +1,6 @@
 """Given values that the records refine: they are fitted, with their standard errors as priors."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +36,7 @@ MOST_HALVINGS, MOST_ITERATIONS, TOLERANCE = 6, 30, 1e-3  # of a start, and of it
 AS_LIKELY = 10.0  # chi-square: weights may yet change
 ALIKE = 0.1  # chi-square: what is likelier by less is the same minimum
 SAME = 1e-2  # of a scaled parameter: ends that are no further apart are one minimum
+HOPELESS = 10.0  # times the noise with all values free: neither weights nor other starts mend that
 BEYOND_NOISE = 1.3  # times the cost of the noise, whose variance is known to 12 %
 MOST_OF_EVENT = 2  # an event shows so many values that all are off where it asks for more
 
@@ -55,22 +56,34 @@ def with_refined_values(state: SearchState) -> SearchState:
     most = MOST_OF_EVENT if event else MOST_VALUES
     while found.names and len(steps) < most and not state.interrupted:
         steps.append(found)
-        state = _with_freed(state, {name: given[name] for name in found.names if name in given})
+        freed = {name: given[name] for name in found.names if name in given}
+        state = driving_noise(_with_freed(state, freed))
         evidence = _evidence(state)
         found = value_that_the_record_refines(evidence)
     asks_for_more = found.names or evidence.cost > BEYOND_NOISE * evidence.noise_cost
     if event and not state.interrupted and (asks_for_more or _misses(evidence)):
-        values, before = _given(state), state.found
-        best_alone = replace(state, searched=before._replace(minima=None))
-        after, others = _from_other_starts(_with_freed(best_alone, values), before, values)
-        if after.interrupted:
-            best = stopped(before.best, Stop.INTERRUPTED)
-            state = replace(state, searched=before._replace(best=best))
-        elif not _misses(_evidence(after)) and _fall(state, after, values) > found.by_rival:
-            whole = after.found._replace(minima=before.minima, place=before.place)
-            refined = RefinedValues(given, (*steps, found), others)
-            return _held(replace(after, searched=whole), refined)
+        return _with_all(state, given, steps, found)
     return replace(state, refined=RefinedValues(steps=(*steps,)))
+
+
+def _with_all(
+    state: SearchState, given: Values, steps: Sequence[Refinement], found: Refinement
+) -> SearchState:
+    """Fit all values at once, where that explains an event, and better than what was ``found``."""
+    values, before = _given(state), state.found
+    without = replace(state, refined=RefinedValues(steps=(*steps,)))
+    wider = _with_freed(replace(state, searched=before._replace(minima=None)), values)
+    if not wider.interrupted and _misses(_evidence(wider), HOPELESS):
+        return without
+    after, others = _from_other_starts(driving_noise(wider), before, values)
+    if after.interrupted:
+        best = stopped(before.best, Stop.INTERRUPTED)
+        return replace(without, searched=before._replace(best=best))
+    if _misses(_evidence(after)) or _fall(state, after, values) <= found.by_rival:
+        return without
+    whole = after.found._replace(minima=before.minima, place=before.place)
+    refined = RefinedValues(given, (*steps, found), others)
+    return _held(replace(after, searched=whole), refined)
 
 
 def _given(state: SearchState) -> dict[str, float]:
@@ -88,12 +101,12 @@ def _fall(before: SearchState, after: SearchState, values: Values) -> float:
     return residuals.count * (cost / after.found.best.cost - 1.0)
 
 
-def _misses(evidence: Evidence) -> bool:
-    """Test whether the errors of a signal are far above the noise of its record."""
+def _misses(evidence: Evidence, times: float = MISFIT) -> bool:
+    """Test whether the errors of a signal are so many times the noise of its record."""
     if evidence.weighted_by_noise:
-        return evidence.cost > MISFIT**2 * evidence.noise_cost
+        return evidence.cost > times**2 * evidence.noise_cost
     return any(
-        record.comparison.overlays[channel.signal].rmse > MISFIT * noise_of(channel)
+        record.comparison.overlays[channel.signal].rmse > times * noise_of(channel)
         for _, record, _, channel in evidence.channels
     )
 
@@ -124,8 +137,7 @@ def _with_freed(state: SearchState, values: Values) -> SearchState:
     if state.options.weights == "balanced" and not by_noise:  # until now by what a value explains
         deviations = residual_deviations(problem.compressed, point)
         problem = balanced(problem, point, counter, deviations)
-    wider = _searched(state, problem, lambda x: np.append(x, more))
-    return driving_noise(wider)  # whose bias is that of all parameters
+    return _searched(state, problem, lambda x: np.append(x, more))
 
 
 def _from_other_starts(

@@ -27,6 +27,7 @@ from exfit.features.events.input_noise import (
 from exfit.fitting import descents
 from exfit.fitting.build import build_experiments
 from exfit.fitting.channel_weights import as_fitted
+from exfit.fitting.noise import MISFIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.search import fitted as fitted_of
 from exfit.results.intervals import value_errors
@@ -420,8 +421,11 @@ def test_an_interruption_while_all_given_values_are_fitted_is_kept(folder, event
         best = state.found.best._replace(stop=Stop.INTERRUPTED, success=False)
         return replace(state, searched=state.found._replace(best=best))
 
+    def misses(_, times=MISFIT):
+        return times == MISFIT
+
     with (
-        mock.patch.object(refined_values, "_misses", return_value=True),
+        mock.patch.object(refined_values, "_misses", misses),
         mock.patch.object(
             refined_values, "value_that_the_record_refines", return_value=Refinement()
         ),
@@ -441,6 +445,19 @@ def test_an_interruption_of_the_further_starts_of_given_values_is_kept(values_of
         result = fit(values_off)
     assert result.interrupted
     assert not result.refined
+
+
+def test_a_fit_that_no_values_bring_near_the_record_is_not_searched_from_others(folder, event):
+    content = yaml.safe_load(event_case(folder, "event").read_text())
+    del content["given"]
+    content["record"]["channels"] |= {"p": "q", "q": "p"}  # a mistake of whoever wrote the case
+    path = folder / "hopeless.yaml"
+    path.write_text(yaml.safe_dump(content))
+    with mock.patch.object(refined_values, "short_descent") as searched:
+        result = fit(path)
+    assert not searched.called
+    assert not result.refined
+    assert result.verdict.misfit
 
 
 @pytest.fixture(scope="module")
