@@ -24,7 +24,7 @@ from exfit.records.steps import RecordedStep, bounds_of_instant
 from exfit.records.units import alike, scale_between, unit_of, usual
 from exfit.registry import parts
 from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
-from exfit.util.text import near
+from exfit.util.text import magnitude_fault, near
 
 BASE = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D.*)?")
 
@@ -54,6 +54,8 @@ def base_of(text: str) -> Base:
     unit = parts["unit"].strip() if parts is not None and parts["unit"] else None
     if parts is None or float(parts["value"]) <= 0.0 or (unit and unit_of(unit) is None):
         raise ExfitError(f"{text!r} is not a positive number with a unit, as 15.75kV")
+    if fault := magnitude_fault(float(parts["value"])):
+        raise ExfitError(fault)
     return Base(float(parts["value"]), None if unit is None else usual(unit))
 
 

@@ -99,6 +99,7 @@ def test_a_base_is_written_in_the_unit_of_its_channel(record, new, base, value):
     [
         ("vt=15.75kA", "Ugen (kV) is in kV"),
         ("vt=-3kV", "not a positive number with a unit"),
+        ("vt=1e308kV", "1e+308 exceeds 1e+100"),
         ("ut=15.75kV", "not a signal and its base"),
         ("15.75kV", "give it as vt=15.75kV"),
     ],
