@@ -23,6 +23,7 @@ OF_GOVERNOR = (REFERENCE, INJECTION, ISOLATED_LOAD, FOLLOWING)
 BETWEEN_CHANGES = 0.2  # s: so long a change is above the noise, and no drift
 ABOVE_NOISE = 5.0  # times the noise of p: then it moves
 CERTAINLY = 0.3  # correlation of the changes of q and vt: whose sign counts
+CLOSELY = 0.8  # and what it is by a reference, while the frequency moves, too
 OF_GRID = 5e-4  # pu: what the frequency of a grid event moves by; less is a unit's swing
 OF_ISOLATED = 5e-3  # pu: so far the speed of a unit in a grid hardly moves
 AT_ONCE = 0.5  # s: so soon p follows a load, and no gate yet
@@ -143,7 +144,7 @@ def _by_what_moves(record: "Inspection", signals: Mapping[str, Array]) -> KindOf
     if _swings(record, signals):
         return KindOfTest(EVENT, f"{names['p']} moves more than {names['q']}, as behind a loss")
     lasts = any(names.get("vt") in step.sizes for step in record.steps)
-    if together > CERTAINLY and (lasts or not _turns(signals)):
+    if together > _least_together(signals, lasts) and (lasts or "angle" not in signals):
         return KindOfTest(BUMP, f"{names['q']} moves with {names['vt']}: {BY_REFERENCE}")
     on_load = bool({"p", "q"} & signals.keys())
     if record.steps and "vt" in signals and not on_load:
@@ -177,8 +178,8 @@ def _by_frequency(
     names: Mapping[str, str], signals: Mapping[str, Array], on_load: bool
 ) -> KindOfTest | None:
     """Suppose a grid event where a frequency or an angle moves and nothing else is known."""
-    moved = _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
-    if on_load and "vt" in signals and _turns(signals):
+    moved = _range_of_frequency(signals)
+    if on_load and "vt" in signals and ("angle" in signals or moved > OF_GRID):
         why = f"{names.get('angle') or names['frequency']} moves with the power"
         return KindOfTest(EVENT, f"{why}; or is it a bump test? {_lacking(names)}".strip())
     if moved > OF_GRID and not on_load and not {*FIELDS} & signals.keys():
@@ -187,11 +188,13 @@ def _by_frequency(
     return None
 
 
-def _turns(signals: Mapping[str, Array]) -> bool:
-    """Whether an angle was recorded, or a frequency that moves as that of a grid."""
-    return "angle" in signals or (
-        "frequency" in signals and _range_pu(signals["frequency"]) > OF_GRID
-    )
+def _least_together(signals: Mapping[str, Array], lasts: bool) -> float:
+    """Return by how much q follows vt where a reference moves both; ``lasts`` of a step of vt."""
+    return CLOSELY if _range_of_frequency(signals) > OF_GRID and not lasts else CERTAINLY
+
+
+def _range_of_frequency(signals: Mapping[str, Array]) -> float:
+    return _range_pu(signals["frequency"]) if "frequency" in signals else 0.0
 
 
 def _lacking(names: Mapping[str, str]) -> str:

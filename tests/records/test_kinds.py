@@ -63,9 +63,15 @@ def test_a_step_of_the_voltage_reference_is_no_test_of_the_governor():
     assert found.name not in OF_GOVERNOR
 
 
-@pytest.mark.parametrize(("size", "name"), [(1e-4, BUMP), (6e-4, EVENT)])
-def test_where_q_swings_with_the_voltage_and_no_step_lasts_the_frequency_tells(size, name):
-    swing = after(0.2) * np.exp(-0.2 * TIME) * np.sin(5.0 * TIME) / np.exp(-2.0)
-    found = kind(vt=1.0 + 0.01 * swing, q=0.1 + 0.03 * swing, p=0.6 + 0.02 * swing,
-                 frequency=60.0 * (1.0 + size * swing))  # fmt: skip
+@pytest.mark.parametrize(
+    ("late", "size", "name"), [(0.0, 6e-4, BUMP), (1.0, 6e-4, EVENT), (1.0, 1e-4, BUMP)]
+)
+def test_where_q_swings_as_the_voltage_by_half_and_no_step_lasts_the_frequency_tells(
+    late, size, name
+):
+    def swing(phase=0.0):
+        return after(0.2) * np.exp(2.0 - 0.2 * TIME) * np.sin(5.0 * TIME - phase)
+
+    found = kind(vt=1.0 + 0.01 * swing(), q=0.1 + 0.03 * swing(late), p=0.6 + 0.02 * swing(),
+                 frequency=60.0 * (1.0 + size * swing()))  # fmt: skip
     assert found.name == name
