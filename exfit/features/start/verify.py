@@ -12,7 +12,6 @@ from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
     force_option,
-    load,
     output_option,
     progress_option,
     quiet_option,
@@ -20,7 +19,7 @@ from exfit.cli.options import (
 )
 from exfit.cli.records import bases_option, steps_option
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError
+from exfit.errors import CaseError, ExfitError
 from exfit.features.planner.commands import bus_option
 from exfit.features.start import command
 from exfit.features.start.command import (
@@ -34,6 +33,7 @@ from exfit.features.start.command import (
 from exfit.util.interrupts import interrupted
 
 if TYPE_CHECKING:
+    from exfit.case.case import Case
     from exfit.output.events import Events
 
 MARK = "# made by exfit verify, which replaces this file unless it is edited: "
@@ -111,14 +111,16 @@ def verify(
     made = new_case(checked(given), case.parent, read)
     show = Output(None, True, quiet, as_json=False, progress=progress, events=events)
     show.warn(made.doubts)
-    write_text(_marked(made.draft.text), case, ())
+    text = _marked(made.draft.text)
+    loaded = _checked(text, case)
+    write_text(text, case, ())
     if show.shown:
         validating = sum(test.validates for test in made.tests)
         counts = f"{len(made.tests) - validating} fitted, {validating} for validation"
         left = typical_left(made)
         echo(f"record: {source.name}; tests: {counts}")
         echo(f"case: {case}" + (f"; typical, not of this unit: {left}" if left else ""))
-    result, folder = fit_case(load(case), show)
+    result, folder = fit_case(loaded, show)
     if interrupted():  # the fit is kept; exfit report writes the page of it
         raise SystemExit(NOT_CONVERGED)
     pages = write_report(folder, place, force)
@@ -131,6 +133,17 @@ def verify(
 def _marked(text: str) -> str:
     """Return the text of a case with a last line that shows whether it was edited."""
     return f"{text}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:DIGITS]}\n"
+
+
+def _checked(text: str, case: Path) -> "Case":
+    """Return the case of a text that is still to be written; raises CaseError, which says so."""
+    from exfit.case.load import parse_case
+
+    try:
+        return parse_case(text, case)
+    except CaseError as fault:
+        remedy = "correct the answers, or edit the case that `exfit new` makes of them"
+        raise CaseError((*fault.faults, f"{case} is not written: {remedy}")) from None
 
 
 def _refuse_edited(case: Path) -> None:

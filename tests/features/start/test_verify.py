@@ -197,6 +197,17 @@ def test_a_case_that_somebody_edited_is_not_written_over(empty_folder, run, loca
     assert case.read_text(encoding="utf-8") != edited
 
 
+def test_a_case_that_is_refused_is_not_written(empty_folder, run):
+    answers = ANSWERS.read_text(encoding="utf-8").partition("validate:")[0]
+    (empty_folder / "a.yaml").write_text(answers.replace("Xd: 1.8", "Xd: 0.1"), encoding="utf-8")
+    record = SAMPLES / "field_record.csv"
+    ran = run("verify", record, "--answers", "a.yaml", "-o", "new/r.html")
+    assert ran.code == 1
+    assert "plant.parameters.Xd: 0.1 is not above Xpd = 0.3" in ran.err
+    assert "field_record.yaml is not written" in ran.err
+    assert [path.name for path in empty_folder.iterdir()] == ["a.yaml"]
+
+
 @pytest.mark.parametrize("name", ["report.txt", "report.yaml", "folder.html", "notes.html"])
 def test_a_report_that_cannot_be_written_is_refused_before_any_work(empty_folder, run, name):
     (empty_folder / "folder.html").mkdir()
