@@ -4,9 +4,12 @@ Fifty of each kind, a few of those that a process of their own reads; ``tests/st
 a hundred thousand, with a limit of memory.
 """
 
+import copy
+
 import pytest
 from mutant_files import KINDS, mutant
 from mutant_runs import CODES, MOST_BYTES, MOST_LINES, Ran, judged, tried, written
+from mutants import VALUES, json_bytes, mutated_tree, randomness
 
 SEED = 11
 IN_A_PROCESS, FEWER = {"workbook", "mat", "parquet"}, 8  # each mutant takes half a second more
@@ -43,6 +46,14 @@ def test_kind_seed_and_number_determine_a_mutant(kind):
     first, again = ([mutant(kind, SEED, number) for number in numbers] for _ in range(2))
     assert first == again
     assert [mutant(kind, SEED + 1, number) for number in numbers] != first
+
+
+def test_values_that_a_tree_has_from_a_list_do_not_change_with_it():
+    before = copy.deepcopy(VALUES)
+    for number in range(300):
+        tree = mutated_tree(randomness("tree", SEED, number), {"a": {"b": 1}}, {}, [], ["c", "d"])
+        json_bytes(tree)  # it does not hold itself
+    assert repr(before) == repr(VALUES)
 
 
 def ran(code=1, out="", err="Error: x\n", fault=None, seconds=0.1):

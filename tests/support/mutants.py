@@ -257,6 +257,11 @@ def _nested(rng: random.Random, value: Any) -> Any:
     return value
 
 
+def _some_value(rng: random.Random) -> Any:
+    """Return a copy, which later changes may change."""
+    return copy.deepcopy(rng.choice(VALUES))
+
+
 def _many(rng: random.Random) -> int:
     """Return how many keys are added: seldom so many that reading them takes a second."""
     return MANY if rng.random() < 0.03 else rng.choice((1, 30, 300))
@@ -266,7 +271,7 @@ def _other_value(rng: random.Random, value: Any, other: Any) -> Any:
     """Return what stands in place of a value: of another type or size, or from another tree."""
     match rng.randrange(8):
         case 0 | 1:
-            return copy.deepcopy(rng.choice(VALUES))
+            return _some_value(rng)
         case 2:
             return rng.choice(PAYLOADS)
         case 3:
@@ -284,7 +289,7 @@ def _other_value(rng: random.Random, value: Any, other: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         factors = (-1, 0, 1e-300, 1e300, 10, 0.1, 2, 1 + 1e-12, 1e6, 1e-6)
         return (float(value) if abs(value) < 1e300 else 1e300) * rng.choice(factors)
-    return rng.choice(VALUES)
+    return _some_value(rng)
 
 
 def _changed(rng: random.Random, tree: Any, other: Any, names: Sequence[str]) -> str:
@@ -311,7 +316,7 @@ def _changed(rng: random.Random, tree: Any, other: Any, names: Sequence[str]) ->
             return f"copy {second} to {place}"
         case 5 | 6 if names and isinstance(holder, dict):
             name = rng.choice(names)
-            value = rng.choice(VALUES)
+            value = _some_value(rng)
             holder[name] = {rng.choice(names): value} if rng.random() < 0.3 else value
             return f"add {name} beside {place}"
         case 3 if isinstance(holder, list):

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from exfit.features.fleet.folder import CaseSummary, Fleet
     from exfit.output.events import Events
 
-FAILED = 1  # the exit code where cases are without a fit
 WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
 
 
@@ -216,6 +215,6 @@ def _exit(fleet: "Fleet", quiet: bool) -> None:
     if without and not fleet.interrupted:
         if quiet:
             raise FileError(_said(row.reason, fleet.folder / row.case) for row in without)
-        raise SystemExit(FAILED)
+        raise ExfitError(f"cases without a fit: {len(without)} of {len(rows)}")
     if fleet.interrupted or not all(row.holds for row in done):
         raise SystemExit(NOT_CONVERGED)

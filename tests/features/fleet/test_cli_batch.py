@@ -52,6 +52,9 @@ def test_a_case_without_a_fit_is_exit_code_1_and_a_poor_fit_3(run):
     code, out, err = run("batch", "cases", "-q")
     assert (code, out) == (1, "")
     assert err.startswith("Error: cases/d.yaml:1: plant: is missing\n")  # said, however quiet
+    for options in ([], ["--json"]):  # beside the table, for a script that reads standard error
+        code, _, err = run("batch", "cases", *options)
+        assert (code, err) == (1, "Error: cases without a fit: 1 of 4\n")
     assert run("batch", "cases/a.yaml", "-q").code == 0  # the others are not of this run
     assert len(rows()) == 4
 
