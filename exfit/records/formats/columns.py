@@ -101,7 +101,7 @@ class Columns:
         ticks, *times = whole.values()
         for time in times:
             ticks = ticks + time
-        return np.asarray((ticks - ticks[:1]) / SECOND, np.float64)
+        return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
     def place(self, row: int) -> str:
         """Return the place of a sample, counted from 0, as messages name it."""

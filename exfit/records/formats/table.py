@@ -193,14 +193,14 @@ def increases(table: RecordTable, columns: Sequence[str]) -> bool:
 
 
 def refuse_uneven(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
-    """Raise a RecordError where columns, or a column and the time, differ in length."""
+    """Raise a RecordError where columns, or a column and the time, are empty or of two lengths."""
     first = next(iter(columns), "")
     for name, column in columns.items():
+        if not len(column):
+            raise RecordError(f"{path}: column {name!r} has no samples")
         if len(column) != len(columns[first]):
-            raise RecordError(
-                f"{path}: column {first!r} has {len(columns[first])} samples, {name!r} has "
-                f"{len(column)}"
-            )
+            counts = f"{first!r} has {len(columns[first])} samples, {name!r} has {len(column)}"
+            raise RecordError(f"{path}: column {counts}")
 
 
 def column_error(place: Path | str, name: str, what: str) -> RecordError:

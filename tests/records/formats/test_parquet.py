@@ -130,10 +130,12 @@ def test_a_missing_instant_is_refused(parquet):
     refused(lambda: table.instants(["ts"]), "bump.parquet: row 2", "'ts'", "missing")
 
 
-def test_timestamps_that_a_damaged_file_lacks_are_no_time(parquet):
+@pytest.mark.parametrize("kind", ["M8[us]", float])
+def test_a_column_whose_samples_a_damaged_file_lacks_is_refused(parquet, kind):
     table = read_parquet(parquet({"ts": INSTANTS}))
-    without = replace(table, fetch=lambda _: np.array([], "M8[us]"))
-    assert without.instants(["ts"]).tolist() == []
+    without = replace(table, fetch=lambda _: np.array([], kind))
+    for read in (without.instants, without.numbers):
+        refused(lambda read=read: read(["ts"]), "bump.parquet", "column 'ts' has no samples")
 
 
 OTHERS = {
