@@ -50,11 +50,12 @@ class FreeParameter:
 
         Without one of them it is twice the distance of the start to zero or, where that is more,
         to the other one: half of it, a reasonable step, then is the size of the start. Where that
-        is 0, it is the interval that the equations allow, if they do.
+        is 0, it is the interval that the equations allow, if they do. Bounds that rounding makes
+        one leave nothing to scale: any number will do.
         """
         interval = self.high - self.low
         if self.given is None and isfinite(interval):
-            return interval
+            return interval or 1.0
         given = (self.low, self.high) if self.given is None else self.given
         distances = [abs(self.start - bound) for bound in (0.0, *given) if isfinite(bound)]
         return 2.0 * max(distances) or (interval if isfinite(interval) else 0.0)

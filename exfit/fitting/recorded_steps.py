@@ -168,6 +168,10 @@ def _with_bounds(place: str, given: Unknown, start: float, low: float, high: flo
     if not low <= start <= high:
         text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
         raise CaseError(f"{place}: {text}")
+    if low == high:
+        raise CaseError(
+            f"{place}: the record shows {start:.4g}, which sets no bounds: give min and max"
+        )
     return Unknown(start=start, min=low, max=high)
 
 

@@ -4,10 +4,14 @@ import json
 
 import numpy as np
 import pytest
+from cases import FIRST_ORDER, TRUTH
+from cases import TIME as SECONDS
 from records import SAMPLES, STEP, TEST, TIME, case_of, config, found_in, one, synthetic, write
 
+from exfit.case.case import Case
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiments
+from exfit.records.record import Record
 from exfit.workflows import fit
 
 REFERENCE = SAMPLES.parent / "tests" / "reference"
@@ -110,3 +114,13 @@ def test_the_voltage_at_rest_keeps_the_bounds_that_are_given(tmp_path):
     test["vt0"]["min"] = 1.05
     with pytest.raises(CaseError, match=r"test\.vt0: the record shows .* outside 1\.05"):
         build_experiments(case_of(one(test), tmp_path))
+
+
+def test_a_voltage_of_zero_at_rest_needs_the_bounds_of_the_case():
+    """A share of zero on each side of it is no interval."""
+    record = Record.from_arrays(SECONDS, {"vt": TRUTH})
+    content = {**FIRST_ORDER, "test": {**FIRST_ORDER["test"], "vt0": {"start": "auto"}}}
+    with pytest.raises(CaseError, match=r"test\.vt0: the record shows 0, .*: give min and max"):
+        build_experiments(Case.from_dict(content, record))
+    content["test"]["vt0"] |= {"min": -0.1, "max": 0.1}
+    assert abs(fit(Case.from_dict(content, record)).parameters["vt0"].value) < 1e-6

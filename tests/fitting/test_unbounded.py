@@ -32,6 +32,7 @@ from exfit.output import fits, terminal
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
+from exfit.results.verdict import NO_MATCH
 from exfit.workflows import check, fit, profile, simulate
 from exfit.workflows.given_values import changed_values, read_parameters, with_given_values
 
@@ -61,6 +62,21 @@ def test_every_parameter_has_a_size_by_which_to_search(start, below, above):
         assert steps[0] == pytest.approx(steps[1], rel=ROUNDING)
     if below is not None and above is not None:
         assert parameter.width == high - low
+
+
+@pytest.mark.parametrize("start", [0.0, 2.7e16])
+def test_bounds_that_rounding_makes_one_hold_the_parameter(start):
+    """A voltage of 2.7e16 with a tenth more and less is that voltage."""
+    parameter = FreeParameter("x", start, start, start, logarithmic=False)
+    assert parameter.value(parameter.scaled(start)) == start
+    assert parameter.unit > 0.0
+
+
+def test_a_voltage_beyond_the_resolution_of_numbers_ends_in_a_verdict():
+    """That the causes of it are tried between bounds that are one ends nothing."""
+    content = FIRST_ORDER | {"test": FIRST_ORDER["test"] | {"vt0": 2.7e16}}
+    record = Record.from_arrays(TIME, {"vt": TRUTH})
+    assert fit(Case.from_dict(content, record)).verdict.verdict == NO_MATCH
 
 
 def unit_with(free, values, folder):

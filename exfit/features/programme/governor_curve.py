@@ -117,7 +117,8 @@ def droop_curve(
     not compared. Arguments as of ``gate_curve``; ``answer`` is named. The usual limit is
     LARGEST_SHARE of its rms about the mean, or LARGEST_NOISES times its noise if that is larger.
 
-    Raises RecordError for samples that are not even, ModelError for a governor without a droop.
+    Raises RecordError for samples that are not even or an answer that never changes, ModelError for
+    a governor without a droop.
     """
     symbols = [each.name for each in free] + [row.symbol for row in governor.sheet]
     droop = next((name for name in symbols if name in (*DROOPS, *GAINS)), None)
@@ -137,8 +138,10 @@ def droop_curve(
         response = values[LEVEL] - behind - values[SHARE] * (outside - behind)
         return np.asarray(response[first:])
 
-    spread = float(np.ptp(measured))
-    middle, longest = float(np.mean(measured)), LONGEST_LAG * float(time[-1] - time[0])
+    spread, middle = float(np.ptp(measured)), float(np.mean(measured))
+    if spread == 0.0:
+        raise RecordError(f"{name}: {show(middle)} pu throughout: no response to the speed")
+    longest = LONGEST_LAG * float(time[-1] - time[0])
     found = (
         FreeParameter(LEVEL, middle, middle - spread, middle + spread, logarithmic=False),
         FreeParameter(LAG, 3.0 * sampling, SHORTEST_LAG * sampling, longest, logarithmic=True),

@@ -178,6 +178,13 @@ def test_a_record_with_a_gap_is_refused():
         droop.fitted(columns, np.random.default_rng(1))
 
 
+def test_a_gate_that_never_moves_is_refused():
+    _, columns = droop.drawn(np.random.default_rng(1))
+    columns["gate"][:] = 0.55
+    with pytest.raises(RecordError, match=r"gate: 0\.55 pu throughout"):
+        droop.fitted(columns, np.random.default_rng(1))
+
+
 def test_a_gate_that_lies_elsewhere_is_no_match():
     model, power = GOVERNORS["TGOV1"], np.linspace(0.2, 0.9, 8)
     free = [FreeParameter("R", 0.05, 0.01, 0.3, logarithmic=True)]
