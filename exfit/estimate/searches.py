@@ -6,7 +6,7 @@ by a trust region, or as textbooks have it, by the gain ratio or Armijo's rule.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import inf, isfinite, isnan, nan, sqrt
+from math import hypot, inf, isfinite, isnan, nan, sqrt
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -334,17 +334,18 @@ def damping(linear: LinearModel, radius: float) -> float:
         s, b = s[determined], (left.T @ b)[determined]
     if norm(b / s) <= (1.0 + SLACK) * radius:
         return 0.0
-    low, high = 0.0, norm(s * b) / radius
+    low, high = 0.0, hypot(*(s * b)) / radius
     nu = 1e-3 * high
     for _ in range(NEWTON_STEPS):
-        length = norm(s * b / (s**2 + nu))
+        y = s * b / (s**2 + nu)
+        length = norm(y)
         if abs(length - radius) <= SLACK * radius:
             break
         low, high = (nu, high) if length > radius else (low, nu)
-        fall = float(np.sum((s * b) ** 2 / (s**2 + nu) ** 3))
+        fall = float(np.sum(y**2 / (s**2 + nu)))
         nu += (length / radius - 1.0) * length**2 / fall
         if not low < nu < high:
-            nu = max(1e-3 * high, sqrt(low * high))
+            nu = max(1e-3 * high, sqrt(low) * sqrt(high))
     return nu
 
 

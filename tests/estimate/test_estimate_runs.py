@@ -96,6 +96,19 @@ def test_rounding_carries_no_call_across_a_bound(method):
         assert low <= min(points) <= max(points) <= high
 
 
+@pytest.mark.parametrize("method", SAFE_METHODS)
+@pytest.mark.parametrize("power", [-300, 180, 300])
+def test_the_unit_of_the_residuals_changes_no_step(method, power):
+    """A power of two changes no digit: of residuals as large as 1e90 no square may overflow."""
+    for fun, start in (rosenbrock, [-1.2, 1.0]), (beale, [1.0, 1.0]):
+        once = least_squares(fun, start, method=method, x_scale=1.0)
+        times = least_squares(
+            lambda x, fun=fun: fun(x) * 2.0**power, start, method=method, x_scale=1.0
+        )
+        assert times.nfev == once.nfev
+        assert times.x == pytest.approx(once.x, rel=1e-9)
+
+
 @pytest.mark.long
 @for_every_run
 def test_the_result_belongs_to_the_best_trial(seed, method, jac):
