@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, repeat
-from math import floor, inf, isfinite, log10
+from math import floor, inf, isfinite, isnan, log10
 from types import NoneType
 from typing import Any
 
@@ -163,7 +163,12 @@ def error_of_interval(low: float | None, high: float | None) -> float | None:
 
 
 def percentage(value: float) -> str:
-    """Return a percentage with two decimals, in few characters where it is beyond all measure."""
+    """Return a percentage with two decimals, in few characters where it is beyond all measure.
+
+    One that does not exist, as the fit to a record that never moves, is a dash.
+    """
+    if isnan(value):
+        return "-"
     return f"{value:.2e}" if abs(value) >= LARGEST_PERCENTAGE else f"{value:.2f}"
 
 

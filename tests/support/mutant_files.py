@@ -8,6 +8,7 @@ import io
 import json
 import math
 import random
+import re
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
@@ -125,14 +126,81 @@ def _programme(rng: Random, changes: Changes) -> Files:
 
 
 def _run_programme(rng: Random, changes: Changes) -> Files:
-    files = {"programme.yaml": PROGRAMME_AT_REST}
-    if rng.random() < 0.5:
-        return {"programme.yaml": _yaml(rng, (PROGRAMME_AT_REST,), changes)}
-    for key in ("programme_saturation.csv", "programme_v_curve.csv"):
-        data = (ROOT / "sample_data" / key).read_bytes()
-        files[key] = mutated_bytes(rng, data, data, changes, text=True)
-    files["programme.yaml"] = PROGRAMME_AT_REST.replace(b"../sample_data/", b"")
-    return files
+    """Return a programme whose own text, whose records or whose samples are damaged."""
+    way = rng.random()
+    if way < 0.4:
+        return {"programme.yaml": _yaml(rng, (PROGRAMME_AT_REST, GOVERNED), changes)} | {
+            name: csv(table) for name, table in _records_of_governor().items()
+        }
+    programme = PROGRAMME_AT_REST.replace(b"../sample_data/", b"")
+    if way < 0.6:
+        files = {"programme.yaml": programme}
+        for key in ("programme_saturation.csv", "programme_v_curve.csv"):
+            data = (ROOT / "sample_data" / key).read_bytes()
+            files[key] = mutated_bytes(rng, data, data, changes, text=True)
+        return files
+    if way < 0.8:
+        programme, records = GOVERNED, dict(_records_of_governor())
+    elif way < 0.97:
+        records = {
+            key: _sample(key) for key in ("programme_saturation.csv", "programme_v_curve.csv")
+        }
+    else:  # with simulations, which take longer
+        whole = dict(_configs("programmes"))["ac8b_unit1.yaml"]
+        programme = whole.replace(b"../sample_data/", b"")
+        records = {
+            key.decode(): _sample(key.decode()) for key in re.findall(rb"\w+\.csv", programme)
+        }
+    name = rng.choice(sorted(records))
+    records[name] = _with_damaged_samples(rng, records[name], changes)
+    return {"programme.yaml": programme} | {name: csv(table) for name, table in records.items()}
+
+
+@cache
+def _sample(name: str) -> Table:
+    """Return a record of the samples."""
+    first, *rows = (ROOT / "sample_data" / name).read_text().splitlines()
+    columns = zip(*(map(float, row.split(",")) for row in rows), strict=True)
+    return Table(first.split(","), [[*column] for column in columns])
+
+
+GOVERNED = b"""model: SEXS
+plant: {type: infinite-bus, machine: GENSAL, network: {f0: 60, X: 0.25, P: 0.6, E: 1.0}}
+governor: {model: HYGOV, parameters: {Tf: 0.05, Tg: 0.25}}
+parameters: {fixed: {TATB: 1.0, TB: 0.0}}
+tests:
+  - name: slow
+    kind: governor
+    file: slow.csv
+    columns:
+      {time: t, speed: {column: f, unit: Hz, base: 60}, gate: {column: Y, unit: "%", base: 100}}
+    free:
+      R: {start: 0.05, min: 0.01, max: 0.3}
+      DBH: {start: 0.0003, min: 0.0, max: 0.005, scale: linear}
+  - name: gate
+    kind: governor
+    file: gate.csv
+    columns: {p: P, gate: Y}
+    free:
+      At: {start: 1.0, min: 0.5, max: 2.0}
+      qNL: {start: 0.05, min: 0.0, max: 0.3, scale: linear}
+"""
+
+
+@cache
+def _records_of_governor() -> Mapping[str, Table]:
+    """Return a record of a speed that wanders, and points of gate over power."""
+    noise = random.Random(0)
+    slow: list[list[float]] = [[], [], []]
+    speed, gate = 0.0, 60.0
+    for k in range(300):
+        speed += -0.02 * speed + noise.gauss(0.0, 0.004)  # Hz
+        gate += 0.3 * (60.0 - 40.0 * speed - gate)
+        for column, value in zip(slow, (4.0 * k, 60.0 + speed, gate), strict=True):
+            column.append(value)
+    power = [0.1 + 0.08 * k for k in range(11)]
+    gates = [p / 1.17 + 0.06 + noise.gauss(0.0, 1e-3) for p in power]
+    return {"slow.csv": Table(["t", "f", "Y"], slow), "gate.csv": Table(["P", "Y"], [power, gates])}
 
 
 def _with_numbers(rng: Random, tree: Any, changes: Changes) -> Any:
@@ -404,20 +472,25 @@ validate:
 """
 
 
-def _fitted_record(rng: Random, changes: Changes) -> Files:
-    """Return a case with a record whose samples are damaged, but numbers in a table still."""
-    table = recorded()
-    time, columns = [*table.columns[0]], [[*column] for column in table.columns[1:]]
+def _with_damaged_samples(rng: Random, table: Table, changes: Changes) -> Table:
+    """Return a record whose samples are damaged, but numbers in a table still; seldom its time."""
+    columns = [[*column] for column in table.columns]
     for _ in range(rng.randint(1, 3)):
-        column = rng.choice([time, *columns, *5 * [columns[0]]])
-        first = rng.randrange(len(column))
+        column = rng.choice([*columns, *columns[1:], *5 * [columns[1]]])
+        first = rng.choice((0, rng.randrange(len(column))))
         last = min(first + rng.choice((1, 1, 2, 20, len(column))), len(column))
         what, change = rng.choice([*SAMPLE_CHANGES.items()])
         column[first:last] = [
             None if value is None else change(value, rng) for value in column[first:last]
         ]
-        changes.append(f"samples {first} to {last}: {what}")
-    damaged = Table(table.names, [time, *columns], table.units)
+        changes.append(f"samples {first} to {last} of column {columns.index(column)}: {what}")
+    return Table(table.names, columns, table.units)
+
+
+def _fitted_record(rng: Random, changes: Changes) -> Files:
+    """Return a case with a damaged record to fit, or to validate its fit."""
+    table = recorded()
+    damaged = _with_damaged_samples(rng, table, changes)
     both = [damaged, table] if rng.random() < 0.7 else [table, damaged]
     return {"case.yaml": FITTED} | dict(
         zip(("record.csv", "again.csv"), map(csv, both), strict=True)

@@ -42,7 +42,7 @@ def test_a_percentage_has_two_decimals():
         "-3.00",
         "999999.00",
     ]
-    assert percentage(float("nan")) == "nan"
+    assert percentage(float("nan")) == "-"
 
 
 @pytest.mark.parametrize(("word", "meant"), [("RR", "R"), ("rr", "r"), ("Tpd", "TPD0"), ("R", "R")])

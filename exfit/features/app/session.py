@@ -44,7 +44,7 @@ from exfit.results.io import load_result
 from exfit.results.model import FitResult, Iteration
 from exfit.signals import label_of
 from exfit.util.files import on_disk, within, write
-from exfit.util.text import dotted, near
+from exfit.util.text import dotted, near, percentage
 from exfit.workflows.applied_causes import write_applied
 from exfit.workflows.exploring import Explorer, explorer
 from exfit.workflows.responses import LiveResponse
@@ -554,7 +554,7 @@ def _judged(match: Comparison) -> Content:
         "validation": match.validation,
         "accepted": match.accepted,
         "reason": match.reason,
-        "match": f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.4g} %"
+        "match": f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
         if match.overlays
         else "no response",
     }
@@ -569,7 +569,7 @@ def _record(match: Comparison, whole: bool = False) -> Content:
         time, curves = thinned(match.time, [*moving.values(), *still.values()])
         named = dict(zip([*moving, *still], curves, strict=True))
         own = match.channels[signal]
-        figures = {"rmse": f"{own.rmse:.4g}", "fit": f"{own.fit_percent:.2f}"}
+        figures = {"rmse": f"{own.rmse:.4g}", "fit": percentage(own.fit_percent)}
         label = {"label": label_of(signal), "time": time} if whole else {}
         signals.append({"signal": signal, **figures, **label, **named})
     cells = [(label, unit, match.features.cells(key)) for label, key, unit in LABELS]
