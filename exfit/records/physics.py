@@ -320,9 +320,11 @@ def _tied(time: Array, vt: Array, efd: Array, ifd: Array) -> float:
     block = max(len(time) // MOST_SAMPLES, 1)
     whole = np.isfinite(vt) & np.isfinite(efd) & np.isfinite(ifd)
     t, *signals = (_block_means(values[whole], block) for values in (time, vt, efd, ifd))
+    if len(t) < FEWEST:  # one column has hardly a sample, or has them where another has none
+        return 0.0
     count = max(int(AT_REST * len(t)), FEWEST // 4)
     levels = [float(median(y[:count])) for y in signals]
-    if len(t) < FEWEST or any(abs(level) < 1e-12 for level in levels):
+    if any(abs(level) < 1e-12 for level in levels):
         return 0.0
     u, e, i = (y / level - 1.0 for y, level in zip(signals, levels, strict=True))
     drive = np.concatenate([[0.0], np.cumsum(0.5 * ((e - i)[1:] + (e - i)[:-1]) * np.diff(t))])

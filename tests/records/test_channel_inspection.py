@@ -77,6 +77,19 @@ def test_the_field_of_a_brushless_exciter_is_not_the_generators():
     assert channel(inspection, "Exciter field current").signal is None
 
 
+@pytest.mark.parametrize("lacking", ["vt", "efd", "ifd"])
+def test_a_channel_without_samples_where_others_have_them_ends_nothing(lacking):
+    """A dead channel, and a recorder that takes its channels in turn."""
+    odd = np.arange(len(TIME)) % 2 == 1
+    for own, of_others in ((odd & False, odd | True), (odd, ~odd)):  # where each has samples
+        columns = {
+            name: np.where(own if name == lacking else of_others, samples, np.nan)
+            for name, samples in (("vt", VT), ("efd", EFD), ("ifd", IFD))
+        }
+        shown = inspected(**columns)
+        assert {entry.name for entry in shown.channels} == {"vt", "efd", "ifd"}
+
+
 def test_a_frequency_that_wanders_is_no_step_of_the_test():
     wandering = {"f (Hz)": 50.0 + 0.01 * np.tanh(4.0 * (TIME - 4.0)) + NOISE}
     (step,) = inspected(Ug=VT, **wandering).steps

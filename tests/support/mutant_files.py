@@ -391,7 +391,7 @@ def _programme_result(rng: Random, changes: Changes) -> Files:
 
 @cache
 def recorded(phases: bool = False) -> Table:
-    """Return a bump test of vt and ifd in pu, or the waveforms of three phases."""
+    """Return a bump test of vt, ifd and efd in pu, or the waveforms of three phases."""
     noise = random.Random(0)
     step = 0.001 if phases else 0.025
     time = [step * k for k in range(SAMPLES_IN_TABLE)]
@@ -407,8 +407,10 @@ def recorded(phases: bool = False) -> Table:
         1.1 * x + (0.4 if t > 1.0 else 0.0) * math.exp(1.0 - t)
         for t, x in zip(time, level, strict=True)
     ]
-    measured = [[x + noise.gauss(0.0, 1e-4) for x in column] for column in (level, field)]
-    return Table(["t", "vt", "ifd"], [time, *measured], ["s", "pu", "pu"])
+    slopes = [(b - a) / step for a, b in zip(level, [*level[1:], level[-1]], strict=True)]
+    drive = [x + 5.0 * slope for x, slope in zip(field, slopes, strict=True)]
+    shown = [[x + noise.gauss(0.0, 1e-4) for x in column] for column in (level, field, drive)]
+    return Table(["t", "vt", "ifd", "efd"], [time, *shown], ["s", "pu", "pu", "pu"])
 
 
 def _table(rng: Random, changes: Changes) -> Table:

@@ -403,7 +403,7 @@ def _cells(rng: random.Random, table: Table) -> str:
     cells = table.columns[column]
     if not cells:
         return "nothing"
-    a = rng.randrange(len(cells))
+    a = rng.choice((0, rng.randrange(len(cells))))
     b = a + rng.choice((1, 1, 5, len(cells)))
     value = rng.choice((*CELLS, *PAYLOADS))
     table.columns[column] = [*cells[:a], *([value] * (min(b, len(cells)) - a)), *cells[b:]]
