@@ -1,13 +1,14 @@
 """What kind of test a record holds, and by what it shows: bump test, event, governor test, rest."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from exfit.dsp.quality import moves
 from exfit.signals import COMPARED, FIELDS, OF_BUMP_TEST
-from exfit.util.arrays import Array, median, median_step
+from exfit.util.arrays import Array, median, median_step, present_median
 
 if TYPE_CHECKING:
     from exfit.records.channel_inspection import InspectedChannel
@@ -114,9 +115,8 @@ def _soon_after(record: "Inspection", step: "RecordedStep", signal: str) -> floa
     begin, end = step.at - step.error, step.at + step.error
     before = samples[(time < begin) & (time >= begin - 4.0 * AT_ONCE)]
     after = samples[(time > end) & (time <= end + AT_ONCE)]
-    if not (len(before) and len(after)):
-        return 0.0
-    return float(np.nanmedian(after) - np.nanmedian(before))
+    change = present_median(after) - present_median(before)
+    return change if isfinite(change) else 0.0
 
 
 def _at_rest(record: "Inspection", signals: Mapping[str, Array]) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import running_median
 from exfit.records.channel_inspection import InspectedChannel
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, present_median
 
 POWERS, CURRENT = ("p", "q"), "it"  # what is zero without a stator current
 NEAR_ZERO = 0.03  # of the largest power or current: transducers have such an offset
@@ -91,8 +91,8 @@ def breaker_opening(
     if opening is not None and voltage is not None:
         begin, end = opening.at - opening.error, opening.at + opening.error
         u = samples[voltage.name]
-        before = float(np.nanmedian(u[(time < begin) & (time >= begin - LOOKED_AT_AFTER)]))
-        after = float(np.nanmedian(u[(time > end) & (time <= end + LOOKED_AT_AFTER)]))
+        before = present_median(u[(time < begin) & (time >= begin - LOOKED_AT_AFTER)])
+        after = present_median(u[(time > end) & (time <= end + LOOKED_AT_AFTER)])
         if not abs(after) > STILL_EXCITED * abs(before):
             return None
     return opening

@@ -18,7 +18,7 @@ from exfit.dsp.step_detection import (
     find_step,
     find_steps,
 )
-from exfit.util.arrays import Array
+from exfit.util.arrays import Array, present_median
 
 COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
 COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken
@@ -343,6 +343,4 @@ def _end_level(time: Array, samples: Array, start: float, end: float, share: flo
     """
     length = end - start
     first, last = np.searchsorted(time, [end - share * length, end - MARGIN_SHARE * length])
-    inside = samples[first : max(last, first + 1)]
-    present = inside[np.isfinite(inside)]
-    return float(np.median(present)) if len(present) else float("nan")
+    return present_median(samples[first : max(last, first + 1)])

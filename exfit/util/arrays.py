@@ -1,5 +1,6 @@
 """Arrays by what they hold; medians and distinct values without the masked arrays of NumPy."""
 
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,12 @@ def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
     middle = 0.5 * (parted[..., low] + parted[..., high])
     middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
     return np.expand_dims(middle, axis) if keepdims else middle[()]
+
+
+def present_median(values: NDArray[Any]) -> float:
+    """Return the median of the samples (M,) that are numbers, nan where none is."""
+    present = values[np.isfinite(values)]
+    return float(median(present)) if len(present) else nan
 
 
 def median_step(times: NDArray[Any]) -> float:

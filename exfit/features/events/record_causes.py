@@ -7,7 +7,7 @@ exciter: where the recorded power swings otherwise by far, the record is not tha
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from math import hypot, pi, sqrt
+from math import hypot, inf, pi, sqrt
 from types import MappingProxyType
 
 import numpy as np
@@ -27,7 +27,7 @@ from exfit.results.cause import Cause
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.signals import SIGNALS
-from exfit.util.arrays import Array, median_step
+from exfit.util.arrays import Array, median_step, present_median
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
 
 RATED_VOLTAGES = (0.85, 1.15)  # pu: a unit on load rests between these
@@ -163,12 +163,13 @@ def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[C
     level = {}
     for name, samples in record.signals.items():
         before = samples[(record.time < steady) & np.isfinite(samples)]
-        level[name] = float(np.mean(before)) if len(before) else float("nan")
+        if len(before):
+            level[name] = float(np.mean(before))
     low, high = RATED_VOLTAGES
     if "vt" in level and not low <= level["vt"] <= high:
         text = f"vt rests at {level['vt']:.4g} pu, not between {low:g} and {high:g}"
         remedy = "check its unit, and its base: the rated voltage, line to line"
-        factor = 1.0 / level["vt"]
+        factor = 1.0 / level["vt"] if level["vt"] else None
         for ratio, what in ((1.0 / ROOT, "1 / sqrt(3)"), (ROOT, "sqrt(3)")):
             if abs(level["vt"] / ratio - 1.0) < NEAR_ROOT:
                 text, factor = f"{text}; it is about {what}", 1.0 / ratio
@@ -176,7 +177,8 @@ def rest_causes(record: Record, steady: float, rated: float = 1.0) -> Iterator[C
                     "a voltage from phase to ground is taken for one from phase to phase, or the "
                     "reverse: check the base, or record.phasors.voltage.connection"
                 )
-        yield Cause(text, remedy, "base", {SCALE.format("vt"): number_text(factor)})
+        changes = {} if factor is None else {SCALE.format("vt"): number_text(factor)}
+        yield Cause(text, remedy, "base", changes)
     p, q = level.get("p"), level.get("q", 0.0)
     if p is None:
         return
@@ -295,10 +297,16 @@ def _others_bend(record: Record, name: str, at: float) -> bool:
     near = slice(max(row - BESIDE_SPIKE, 1), row + BESIDE_SPIKE + 1)
     for other, samples in record.signals.items():
         bends = np.abs(np.diff(samples, 2, prepend=samples[:1], append=samples[-1:]))
-        least = BEND * float(np.nanpercentile(bends, MOST_CHANGES))
+        least = BEND * _usual(bends)
         if other != name and np.nanmax(bends[near], initial=0.0) > least:
             return True
     return False
+
+
+def _usual(sizes: Array) -> float:
+    """Return the size that most of some (M,) do not exceed, inf where none is known."""
+    known = sizes[np.isfinite(sizes)]
+    return float(np.percentile(known, MOST_CHANGES)) if len(known) else inf
 
 
 def _jumping_angle(record: Record) -> Iterator[Cause]:
@@ -307,12 +315,11 @@ def _jumping_angle(record: Record) -> Iterator[Cause]:
     if angle is None or p is None:
         return
     jumps = np.diff(angle)
-    jumps = jumps - np.nanmedian(jumps)
-    alone = ALONE * float(np.nanpercentile(np.abs(jumps), MOST_CHANGES))
-    for k in np.flatnonzero(np.abs(jumps) > max(ANGLE_JUMP, alone)):
+    jumps = jumps - present_median(jumps)
+    for k in np.flatnonzero(np.abs(jumps) > max(ANGLE_JUMP, ALONE * _usual(np.abs(jumps)))):
         near = p[max(k - BESIDE_JUMP, 0) : k + BESIDE_JUMP + 2]
-        size = float(jumps[k])
-        if float(np.nanmax(near) - np.nanmin(near)) < LEAST_STIFFNESS * abs(size):
+        near, size = near[np.isfinite(near)], float(jumps[k])
+        if len(near) and float(np.ptp(near)) < LEAST_STIFFNESS * abs(size):
             yield Cause(
                 f"angle jumps by {size:+.2g} rad at {record.time[k + 1]:.4g} s, while p moves by "
                 f"less than {LEAST_STIFFNESS:g} pu for each rad",

@@ -1,5 +1,6 @@
 """Files of grid events in which something is wrong are named before a fit; sound ones are not."""
 
+import numpy as np
 import pytest
 from event_files import BAD, GOOD, bad_file, good_file
 from tiers import few_of
@@ -7,6 +8,8 @@ from unit_events import simulated
 
 from exfit import workflows
 from exfit.errors import ExfitError
+from exfit.features.events.record_causes import rest_causes
+from exfit.records.record import Record
 from exfit.verdict.diagnostics import event_warnings
 
 
@@ -45,3 +48,12 @@ def test_a_check_that_fails_at_rest_names_what_is_wrong_with_the_record(course, 
     with pytest.raises(ExfitError, match=r"about 1 / sqrt\(3\)") as refused:
         workflows.check(case)
     assert "no state of rest" in str(refused.value)
+
+
+def test_a_voltage_of_zero_at_rest_is_named_and_no_base_is_proposed_for_it():
+    time = np.linspace(0.0, 2.0, 21)
+    (cause,) = rest_causes(Record.from_arrays(time, {"vt": 0.0 * time}), 1.0)
+    assert cause.cause.startswith("vt rests at 0 pu")
+    assert not cause.changes
+    only_later = {"vt": np.where(time < 1.0, np.nan, 1.0), "p": 0.5 + 0.0 * time}
+    assert not [*rest_causes(Record.from_arrays(time, only_later, missing=True), 1.0)]
