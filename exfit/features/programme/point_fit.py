@@ -72,7 +72,11 @@ class PointProblem:
         return np.concatenate([self.errors(values), priors])
 
     def jacobian(self, theta: Array) -> Array:
-        """Return the derivatives (M + P, N) to the scaled parameters, by differences in bounds."""
+        """Return the derivatives (M + P, N) to the scaled parameters, by differences in bounds.
+
+        Where there are no errors on one side of a value, as of S10 beside S12, they are taken on
+        the other.
+        """
         low, high = self.bounds
         columns = []
         for k, x in enumerate(theta):
@@ -80,6 +84,10 @@ class PointProblem:
             moved = np.tile(theta, (2, 1))
             moved[:, k] = ends
             below, above = map(self.residuals, moved)
+            if not np.isfinite(below).all():
+                ends[0], below = x, self.residuals(theta)
+            elif not np.isfinite(above).all():
+                ends[1], above = x, self.residuals(theta)
             columns.append((above - below) / (ends[1] - ends[0]))
         return np.stack(columns, axis=1)
 

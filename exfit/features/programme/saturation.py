@@ -10,6 +10,7 @@ is that of the models, so that a machine with these numbers has this curve.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -55,6 +56,7 @@ REWEIGHTED = 2  # times: what is left to a third is below a thousandth of a stan
 PROFILE_POINTS = 2  # to the end of an interval: no figure is drawn of them
 LEAST_ERROR = 1e-6  # pu: no instrument reads so well
 DIFFERENCE = 1e-5  # pu, of S and of a voltage
+EVEN_CURRENT = 1e-9  # of its mean: a field current that differs by less is one
 
 
 class CurvePoints(NamedTuple):
@@ -373,7 +375,10 @@ def saturation_curve(
         ifd=ifd,
         direction=direction,
     )
-    return replace(result, notes=tuple(_notes(result))).as_judged()
+    notes = [*_notes(result)]
+    if efd is not None and resistance is None:
+        notes.append("efd does not rise with ifd: it has no base, and the winding no resistance")
+    return replace(result, notes=tuple(notes)).as_judged()
 
 
 def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
@@ -474,20 +479,23 @@ def _widened(own: MeasuredValue, others: Sequence[MeasuredValue]) -> MeasuredVal
 def _hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> MeasuredValue | None:
     """Return the resistance of the hot field winding, given or as the slope of efd over ifd.
 
-    The line need not pass through zero: brushes have a voltage drop.
+    The line need not pass through zero: brushes have a voltage drop. None where the points leave
+    its sign open.
     """
     if winding.resistance is not None:
         resistance = winding.resistance * winding.rise
         return MeasuredValue(resistance, None, (resistance, resistance), "given, not measured here")
     if efd is None:
         return None
-    matrix = np.column_stack([ifd, np.ones_like(ifd)])
-    line, *_ = np.linalg.lstsq(matrix, efd, rcond=None)
-    dof = len(ifd) - 2
-    variance = float(np.sum((efd - matrix @ line) ** 2)) / dof
-    error = float(np.sqrt(variance * np.linalg.inv(matrix.T @ matrix)[0, 0]))
+    x, y = ifd - np.mean(ifd), efd - np.mean(efd)
+    power = float(x @ x)
+    if power <= len(x) * (EVEN_CURRENT * float(np.mean(ifd))) ** 2:
+        return None
+    slope, dof = float(x @ y) / power, len(x) - 2
+    error = float(np.linalg.norm(y - slope * x)) / sqrt(dof * power)
     half = student_quantile(dof, 0.975) * error
-    slope = float(line[0])
+    if slope <= half:
+        return None
     return MeasuredValue(slope, error, (slope - half, slope + half)).times(winding.rise)
 
 

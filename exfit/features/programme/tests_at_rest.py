@@ -31,11 +31,13 @@ from exfit.features.programme.v_curve import (
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
+from exfit.records.clock import why_unusable
 from exfit.records.formats import open_table
 from exfit.records.formats.table import column_error
 from exfit.records.units import alike, needs_base
 from exfit.signals import FIELDS, TERMINALS
 from exfit.util.arrays import Array
+from exfit.util.text import LARGEST, listed, show
 
 Values = Mapping[str, float]
 
@@ -58,7 +60,7 @@ def points_of(test: SaturationTest | SteadyTest | GovernorTest, folder: Path) ->
     """Return the points of a test, by signal; its file, of any kind of a record, is in a folder.
 
     Raises RecordError for a file that cannot be read, a column that is missing or in another unit,
-    or a cell that is no number.
+    or a cell that is no finite number.
     """
     if test.file is None and not isinstance(test, GovernorTest):
         signals = CURVE_SIGNALS if isinstance(test, SaturationTest) else POINT_SIGNALS
@@ -74,8 +76,20 @@ def points_of(test: SaturationTest | SteadyTest | GovernorTest, folder: Path) ->
             if column.unit is not None and not alike(in_file, column.unit):
                 text = f"in {in_file} as the file says, not in {column.unit}"
                 raise column_error(table.path, names[signal], text)
+    for name, cells in numbers.items():
+        for row in np.flatnonzero(~(np.abs(cells) <= LARGEST))[:1]:
+            text = f"{cells[row]} {why_unusable(cells[row])}"
+            raise column_error(table.place(int(row)), name, text)
     columns = {signal: numbers[name] for signal, name in names.items()}
     return Points(columns, units, table.path)
+
+
+def _refuse_few(test: SteadyTest | GovernorTest, points: Points) -> None:
+    """Raise RecordError where the points do not differ in more places than values are fitted."""
+    different = len({*zip(*(column.tolist() for column in points.columns.values()), strict=True)})
+    if test.free and different <= len(test.free):
+        text = f"{different} different points do not determine {listed([*test.free])}"
+        raise RecordError(f"{text}: {len(test.free) + 1} or more are needed")
 
 
 def steady(
@@ -94,6 +108,9 @@ def steady(
     columns = {signal: _column_of(test, points, signal) for signal in points.columns}
     numbers = {signal: points.columns[signal] * columns[signal].scale for signal in columns}
     p, q, vt = (numbers[signal] / _given_base(columns[signal]) for signal in TERMINALS)
+    for row in np.flatnonzero(vt <= 0.0)[:1]:
+        raise RecordError(f"point {row + 1}: vt {show(vt[row])} pu: not above 0")
+    _refuse_few(test, points)
     start = {**data, **{symbol: free.start for symbol, free in test.free.items()}}
     ifd = field_on_load(machine, start, p, q, vt)
     measurements = {
@@ -120,6 +137,7 @@ def governor(test: GovernorTest, points: Points, model: Model, data: Values) -> 
     rows = {row.symbol: row for row in model.sheet}
     free = [free_parameter(symbol, each, rows[symbol]) for symbol, each in test.free.items()]
     limit = None if test.accept is None else test.accept.rmse
+    _refuse_few(test, points)
     if "speed" not in numbers:
         return gate_curve(model, data, numbers["p"], numbers["gate"], free, limit)
     answer: Answer = "gate" if "gate" in numbers else "p"

@@ -171,11 +171,11 @@ def test_a_test_of_a_governor_needs_one(programme):
         load_programme(path)
 
 
-def test_a_record_with_a_gap_is_refused():
+def test_a_record_with_a_gap_or_whose_time_stands_still_is_refused():
     _, columns = droop.drawn(np.random.default_rng(1))
-    columns["time"][100:] += 5.0
-    with pytest.raises(RecordError, match="at even intervals"):
-        droop.fitted(columns, np.random.default_rng(1))
+    for time in (columns["time"] + 5.0 * (columns["time"] > 100.0), 0.0 * columns["time"]):
+        with pytest.raises(RecordError, match="at even intervals"):
+            droop.fitted({**columns, "time": time}, np.random.default_rng(1))
 
 
 def test_a_gate_that_never_moves_is_refused():

@@ -1,5 +1,7 @@
 """A saturation test of a programme: its section, its points, and what it gives the machine."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from exfit.models.machines import MACHINES
 BASE, RATED = 850.0, 15.75  # A, kV
 VT = np.concatenate([np.linspace(0.2, 1.2, 9), np.linspace(1.1, 0.2, 7)])
 IFD = BASE * (VT + 2.0 * np.maximum(VT - 0.8, 0.0) ** 2)
+SHUFFLED = np.random.default_rng(1).permutation(IFD)
 COLUMNS = {
     "vt": {"column": "Ug", "unit": "kV", "base": RATED},
     "ifd": "If (A)",
@@ -43,6 +46,23 @@ def test_a_file_without_a_time_gives_the_machine_its_saturation_and_the_channels
     assert bases["ifd"][0].value == pytest.approx(BASE, rel=1e-5)
     assert bases["efd"][0].value == pytest.approx(0.2 * BASE, rel=1e-5)
     assert (bases["ifd"][1], bases["efd"][1]) == ("A", "V")
+
+
+@pytest.mark.parametrize("efd", [0.0 * IFD, 0.0 * IFD + 40.0, -0.2 * IFD, SHUFFLED])
+def test_a_field_voltage_that_does_not_rise_with_its_current_gives_no_base(efd):
+    test = section(points=np.column_stack([VT, IFD, efd]).tolist())
+    result = saturation(test, points_of(test, Path()), MACHINES["GENROU"])
+    assert result.efd_base is result.resistance is None
+    assert "efd" not in result.channel_bases
+    assert any("efd does not rise with ifd" in note for note in result.notes)
+    assert result.machine_values["S10"].value == pytest.approx(2.0 * 0.2**2, abs=1e-4)
+
+
+@pytest.mark.parametrize("level", [1.0, 300.0, 1e12])
+def test_a_field_current_that_stays_the_same_gives_no_resistance(level):
+    ifd = level + 0.0 * IFD
+    test = section(points=np.column_stack([VT, ifd, 0.2 * IFD]).tolist())
+    assert saturation(test, points_of(test, Path()), MACHINES["GENROU"]).resistance is None
 
 
 def test_points_in_place_are_the_same_as_in_a_file(file):

@@ -11,6 +11,7 @@ from exfit.features.programme.tests_at_rest import points_of, steady
 from exfit.features.programme.v_curve import field_on_load
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
+from exfit.results.verdict import NO_MATCH, NOT_CONVERGED
 
 SALIENT = MACHINES["GENSAL"]
 DATA = typical(SALIENT.sheet) | {"S10": 0.1, "S12": 0.4}
@@ -85,3 +86,54 @@ def test_a_column_in_another_unit_than_the_file_says_is_refused(folder):
 def test_the_file_is_that_of_the_programme(folder):
     with pytest.raises(RecordError, match="cannot be read"):
         points_of(section_of(), Path("nowhere"))
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+@pytest.mark.parametrize("signal", COLUMNS)
+def test_a_cell_that_is_no_finite_number_is_refused_at_its_place(folder, signal, number):
+    path = folder / "vcurve.csv"
+    first, *rows = path.read_text(encoding="utf-8").splitlines()
+    cells = rows[4].split(";")
+    cells[[*COLUMNS].index(signal)] = number
+    path.write_text("\n".join([first, *rows[:4], ";".join(cells), *rows[5:]]), encoding="utf-8")
+    with pytest.raises(RecordError, match=r"vcurve\.csv:6: column .*: -?(nan|inf) is "):
+        points_of(section_of(), folder)
+
+
+@pytest.mark.parametrize("voltage", [0.0, -1.0])
+def test_a_voltage_that_is_not_above_zero_is_refused(voltage):
+    rows = np.column_stack([P, Q, VT, IFD])
+    rows[3, 2] = voltage
+    test = SteadyTest.model_validate({"kind": "steady", "name": "v", "points": rows.tolist()})
+    with pytest.raises(RecordError, match=r"point 4: vt .* not above 0"):
+        steady(test, points_of(test, Path()), SALIENT, DATA)
+
+
+def test_as_many_different_points_as_values_determine_none():
+    """Their fit has no errors, and its intervals no width."""
+    rows = np.column_stack([P, Q, VT, IFD])[[0, 1] * 6].tolist()
+    free = {"Xd": {"start": 1.0, "min": 0.5, "max": 3.0}}
+    content = {"kind": "steady", "name": "v", "points": rows, "free": free}
+    test = SteadyTest.model_validate(content)
+    assert steady(test, points_of(test, Path()), SALIENT, DATA).readings["ifd"].matches
+    free["Xq"] = {"start": 0.6, "min": 0.3, "max": 2.0}
+    test = SteadyTest.model_validate(content)
+    with pytest.raises(RecordError, match="2 different points do not determine Xd and Xq: 3 or"):
+        steady(test, points_of(test, Path()), SALIENT, DATA)
+
+
+def test_a_fit_that_ends_beside_data_that_contradict_each_other_has_derivatives():
+    """S12 below S10 is no saturation: the errors beyond, and on one side of the end, are none."""
+    ifd = [1.55, 1.74, 1.87, 2.17, 2.52, 2.90]
+    q, vt = [-0.3, -0.1, 0.0, 0.2, 0.4, 0.6], [0.98, 0.99, 1.0, 1.01, 1.02, 1.03]
+    free = {
+        "Xd": {"start": 1.9, "min": 1.0, "max": 3.0},
+        "S10": {"start": 0.12, "min": 0.01, "max": 0.5},
+    }
+    rows = np.column_stack([np.zeros(6), q, vt, ifd]).tolist()
+    content = {"kind": "steady", "name": "v", "points": rows, "free": free}
+    test, machine = SteadyTest.model_validate(content), MACHINES["GENROU"]
+    data = typical(machine.sheet) | {"Xd": 1.8, "Xq": 1.72, "Xl": 0.2, "S10": 0.12, "S12": 0.4}
+    found = steady(test, points_of(test, Path()), machine, data)
+    assert found.machine_data["S10"] == pytest.approx(0.4, rel=1e-3)
+    assert found.verdict.verdict in (NO_MATCH, NOT_CONVERGED)
