@@ -18,6 +18,7 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 import yaml
+from governor_programme import PROGRAMME
 from mutants import (
     Mutant,
     Table,
@@ -164,27 +165,7 @@ def _sample(name: str) -> Table:
     return Table(first.split(","), [[*column] for column in columns])
 
 
-GOVERNED = b"""model: SEXS
-plant: {type: infinite-bus, machine: GENSAL, network: {f0: 60, X: 0.25, P: 0.6, E: 1.0}}
-governor: {model: HYGOV, parameters: {Tf: 0.05, Tg: 0.25}}
-parameters: {fixed: {TATB: 1.0, TB: 0.0}}
-tests:
-  - name: slow
-    kind: governor
-    file: slow.csv
-    columns:
-      {time: t, speed: {column: f, unit: Hz, base: 60}, gate: {column: Y, unit: "%", base: 100}}
-    free:
-      R: {start: 0.05, min: 0.01, max: 0.3}
-      DBH: {start: 0.0003, min: 0.0, max: 0.005, scale: linear}
-  - name: gate
-    kind: governor
-    file: gate.csv
-    columns: {p: P, gate: Y}
-    free:
-      At: {start: 1.0, min: 0.5, max: 2.0}
-      qNL: {start: 0.05, min: 0.0, max: 0.3, scale: linear}
-"""
+GOVERNED = PROGRAMME.encode()
 
 
 @cache
@@ -200,7 +181,10 @@ def _records_of_governor() -> Mapping[str, Table]:
             column.append(value)
     power = [0.1 + 0.08 * k for k in range(11)]
     gates = [p / 1.17 + 0.06 + noise.gauss(0.0, 1e-3) for p in power]
-    return {"slow.csv": Table(["t", "f", "Y"], slow), "gate.csv": Table(["P", "Y"], [power, gates])}
+    return {
+        "slow.csv": Table(["t", "f (Hz)", "Y (%)"], slow),
+        "gate.csv": Table(["P", "Y"], [power, gates]),
+    }
 
 
 def _with_numbers(rng: Random, tree: Any, changes: Changes) -> Any:
