@@ -1,6 +1,6 @@
 """What a recorder did to a channel: spikes, rounding, intervals in which it was stuck."""
 
-from math import log
+from math import log, nan
 from statistics import NormalDist
 
 import numpy as np
@@ -34,6 +34,12 @@ def moves(samples: Array) -> bool:
 def noise_of(samples: Array) -> float:
     """Return the noise of a channel (M,), of a long one from parts all over it."""
     return noise(_excerpt(samples)) if len(samples) >= OUTLIER_WINDOW else 0.0
+
+
+def present_median(values: Array) -> float:
+    """Return the median of the samples (M,) that are numbers, nan where none is."""
+    present = values[np.isfinite(values)]
+    return float(median(present)) if len(present) else nan
 
 
 def spikes(time: Array, samples: Array, scatter: float, limit: float) -> Places:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from exfit.dsp.quality import moves
+from exfit.dsp.quality import moves, present_median
 from exfit.signals import COMPARED, FIELDS, OF_BUMP_TEST
-from exfit.util.arrays import Array, median, median_step, present_median
+from exfit.util.arrays import Array, median, median_step
 
 if TYPE_CHECKING:
     from exfit.records.channel_inspection import InspectedChannel

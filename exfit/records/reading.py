@@ -231,16 +231,14 @@ def _without_repeats(
 ) -> tuple[Places, tuple[str, ...]]:
     """Select the rows that have a time of their own each, and describe the others.
 
-    Raises RecordError where all have one time, or rows of one time differ and nothing says which
-    counts.
+    Raises RecordError where all have one time, or rows of one differ and nothing says which counts.
     """
     again = rows[1:][np.diff(time[rows]) == 0.0]
     if not again.size:
         return rows, ()
     for name, column in columns.items():
-        differ = (column[again] != column[again - 1]) & ~(
-            np.isnan(column[again]) & np.isnan(column[again - 1])
-        )
+        own, former = column[again], column[again - 1]
+        differ = (own != former) & ~(np.isnan(own) & np.isnan(former))
         if repeats == "refuse" and differ.any():
             row = int(again[differ][0])
             raise RecordError(
@@ -249,8 +247,7 @@ def _without_repeats(
                 "or `repeats: last` beside the file of a record leaves out the other"
             )
     if len(rows) - len(again) < FEWEST_SAMPLES:
-        what = f"the time of all {len(rows)} samples is {time[rows[0]]:g} s"
-        raise RecordError(f"{table.path}: {clock.label}: {what}")
+        raise RecordError(f"{table.path}: {clock.label}: all {len(rows)} samples have one time")
     left_out = again - 1 if repeats == "last" else again
     count = "1 row that repeats" if len(again) == 1 else f"{len(again)} rows that repeat"
     text = f"{count} the time of another, the first at {table.place(int(again[0]))}: left out"

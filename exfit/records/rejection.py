@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exfit.dsp.quality import present_median
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import running_median
 from exfit.records.channel_inspection import InspectedChannel
-from exfit.util.arrays import Array, present_median
+from exfit.util.arrays import Array
 
 POWERS, CURRENT = ("p", "q"), "it"  # what is zero without a stator current
 NEAR_ZERO = 0.03  # of the largest power or current: transducers have such an offset

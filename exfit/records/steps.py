@@ -6,7 +6,7 @@ from math import inf
 
 import numpy as np
 
-from exfit.dsp.quality import mains_frequency, noise_of
+from exfit.dsp.quality import mains_frequency, noise_of, present_median
 from exfit.dsp.sampling import present_samples
 from exfit.dsp.step_detection import (
     SAMPLES_AT_REST,
@@ -18,7 +18,7 @@ from exfit.dsp.step_detection import (
     find_step,
     find_steps,
 )
-from exfit.util.arrays import Array, present_median
+from exfit.util.arrays import Array
 
 COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
 COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken

@@ -1,6 +1,5 @@
 """Arrays by what they hold; medians and distinct values without the masked arrays of NumPy."""
 
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -24,18 +23,11 @@ def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
     low, high = (count - 1) // 2, count // 2
     parted = np.partition(samples, (low, high, count - 1), axis=-1)
     if samples.ndim == 1 and not keepdims:
-        return np.float64(
-            parted[-1] if np.isnan(parted[-1]) else 0.5 * (parted[low] + parted[high])
-        )
+        last = parted[-1]
+        return np.float64(last if np.isnan(last) else 0.5 * (parted[low] + parted[high]))
     middle = 0.5 * (parted[..., low] + parted[..., high])
     middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
     return np.expand_dims(middle, axis) if keepdims else middle[()]
-
-
-def present_median(values: NDArray[Any]) -> float:
-    """Return the median of the samples (M,) that are numbers, nan where none is."""
-    present = values[np.isfinite(values)]
-    return float(median(present)) if len(present) else nan
 
 
 def median_step(times: NDArray[Any]) -> float:

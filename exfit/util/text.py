@@ -64,7 +64,7 @@ LEAST_DIGITS = 3  # of a number, however large its error
 ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 MOST_DIGITS = 7  # of a number whose error is as good as none
 MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
-LARGEST_PERCENTAGE = 1e6  # with two decimals: a larger one has an exponent
+MOST_PERCENT = 1e6  # with two decimals: a larger one has an exponent
 MOST_TEXTS = 20  # faults or warnings that are listed
 LONGEST_TEXT = 1000  # characters of one of them
 MOST_NAMES = 30  # that are listed
@@ -163,13 +163,8 @@ def error_of_interval(low: float | None, high: float | None) -> float | None:
 
 
 def percentage(value: float) -> str:
-    """Return a percentage with two decimals, in few characters where it is beyond all measure.
-
-    One that does not exist, as the fit to a record that never moves, is a dash.
-    """
-    if isnan(value):
-        return "-"
-    return f"{value:.2e}" if abs(value) >= LARGEST_PERCENTAGE else f"{value:.2f}"
+    """Return a percentage with two decimals, a huge one in few characters, a dash for nan."""
+    return "-" if isnan(value) else format(value, ".2e" if abs(value) >= MOST_PERCENT else ".2f")
 
 
 def show_value(value: Any) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.case.changes import Changes, number_text
 from exfit.case.schema import Recording
-from exfit.dsp.quality import noise_of, spikes
+from exfit.dsp.quality import noise_of, present_median, spikes
 from exfit.dsp.sampling import sampling_of
 from exfit.errors import SimulationError
 from exfit.fitting.build import build_experiment
@@ -27,7 +27,7 @@ from exfit.results.cause import Cause
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.signals import SIGNALS
-from exfit.util.arrays import Array, median_step, present_median
+from exfit.util.arrays import Array, median_step
 from exfit.verdict.causes.evidence import CERTAIN, Evidence, Suspicion
 
 RATED_VOLTAGES = (0.85, 1.15)  # pu: a unit on load rests between these
