@@ -64,7 +64,7 @@ def with_rest(test: BumpTest, record: Record) -> BumpTest:
         showing["angle"] = record.time[:-1], turning
     ends: list[float] = []
     for signal, (time, course) in showing.items():
-        if np.ptp(course) == 0.0:
+        if not len(course) or np.ptp(course) == 0.0:
             continue
         try:
             ends.append(float(time[rest_end(course)]))

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isfinite, nan
+from math import inf, isfinite, log, nan
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from exfit.case.parts import bounds_of
 from exfit.case.schema import FreeSection
 from exfit.models.sheet import Parameter
+from exfit.util.text import LARGEST
 
 LARGEST_FACTOR = 4.0  # by which a value may differ from the given one
+LARGEST_LOGARITHM = log(LARGEST)  # of a value that has no upper bound
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
@@ -86,7 +88,7 @@ class FreeParameter:
         """Return the parameter's own value; at a bound, exactly that bound."""
         if scaled in self._scaled_bounds:
             return self._scaled_bounds[scaled]
-        return float(np.exp(scaled)) if self.logarithmic else scaled * self._linear_scale
+        return _exp(scaled) if self.logarithmic else scaled * self._linear_scale
 
     def bound(self, value: float) -> Literal["min", "max"] | None:
         """Name the bound on which a value lies."""
@@ -101,7 +103,11 @@ class FreeParameter:
 
     def slope(self, scaled: float) -> float:
         """Return d value / d scaled."""
-        return float(np.exp(scaled)) if self.logarithmic else self._linear_scale
+        return _exp(scaled) if self.logarithmic else self._linear_scale
+
+
+def _exp(logarithm: float) -> float:
+    return float(np.exp(min(logarithm, LARGEST_LOGARITHM)))
 
 
 def free_parameter(name: str, section: FreeSection, row: Parameter | None) -> FreeParameter:

@@ -83,8 +83,9 @@ def _shown(
     """Return an instant as the record shows it, as it was where nothing moves with its step."""
     beginnings = [*_beginnings(setup, values, instant.low, before, after)]
     freedom = sum(len(each.samples) - SHAPES for each in beginnings)
-    low, high = instant.low, instant.high
-    if freedom < 1:
+    # one at the last sample has no response
+    low, high = instant.low, min(instant.high, float(np.mean(setup.record.time[-2:])))
+    if freedom < 1 or not low < high:
         return instant
     from exfit.dsp.step_detection import CHI_SQUARE, interval_below
 

@@ -1,6 +1,7 @@
 """Records beside simulations, as blocks."""
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from math import isnan
 
 from exfit.dsp.features import LABELS
 from exfit.output.blocks import (
@@ -73,7 +74,8 @@ def played(all_of_them: Sequence[Comparison]) -> Iterator[Block]:
         )
         yield from remarks(f"{match.name}: played in:", [", ".join(texts)], "")
         for signal, error in ({} if match.played is None else match.played.errors).items():
-            cells = (f"{error.largest:+.2e}", f"{error.largest_at:.4g}", f"{error.at_rest:+.1e}")
+            numbers = ((error.largest, "+.2e"), (error.largest_at, ".4g"), (error.at_rest, "+.1e"))
+            cells = ("-" if isnan(own) else format(own, form) for own, form in numbers)
             peaks = (_peak(error.measured), _peak(error.simulated))
             rmse = f"{match.channels[signal].rmse:.2e}"
             rows.append(row(match.name, signal, rmse, *cells, *peaks))

@@ -77,7 +77,7 @@ def with_carried(scatter: Scatter, carried: Array) -> Scatter:
     """
     variance = float(np.mean(carried**2))
     total = scatter.std**2 + variance
-    if variance == 0.0:
+    if variance == 0.0 or not np.isfinite(variance):
         return scatter
     share = variance / total
     own = (1.0 - share) ** 2 * scatter.log_variance

@@ -10,7 +10,7 @@ import numpy as np
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.given_errors import given_std_errors
-from exfit.errors import CaseError
+from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_unseen
 from exfit.fitting.channel_weights import as_fitted
 from exfit.fitting.experiment import ExperimentSetup
@@ -181,6 +181,7 @@ def profile(
         if profiles.lower is None or profiles.interrupted or by_twin:
             break
         x = profiles.lower
+    _refuse_exact(case, profiles)
     first = next(iter(profiles.by_index.values()))[0]
     return Profiles(
         name=case.path.stem,
@@ -214,6 +215,13 @@ def _searched(
     if state.interrupted:
         raise KeyboardInterrupt
     return state
+
+
+def _refuse_exact(case: Case, profiles: ProfilesAboutMinima) -> None:
+    """Raise ExfitError where no profile came about: without noise no rise of the cost is one."""
+    if not profiles.by_index:
+        text = "nothing to profile: the record is matched exactly, without noise to rise above"
+        raise ExfitError(f"{case.path}: {text}")
 
 
 def _notes(

@@ -178,6 +178,8 @@ def effect_of_window(setup: ExperimentSetup, experiment: Experiment, values: Val
     as through the record.
     """
     record, parameters = setup.record, experiment.parameters(values)
+    if not {"angle", "frequency"} & record.signals.keys():  # no phasors drive
+        return np.zeros(sum(experiment.sizes))
     if "angle" in record.signals:
         turning = np.gradient(np.unwrap(record.signals["angle"]), record.time)
     else:

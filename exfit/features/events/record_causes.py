@@ -50,6 +50,7 @@ BESIDE_SPIKE, BEND = 2, 3.0  # samples; times what most bends stay below
 SCALE = "record.channels.{}.scale"  # the place of a factor
 COLUMN = "record.channels.{}.column"  # the place of a column; the change names its signal
 SPIKE = 8.0  # times the noise
+FEWEST_SWINGING = 10  # samples of an event, of which swings are compared
 LEAST_SWING = 1e-3  # pu, rms: with less in record or response nothing can be compared
 LEAST_OVER_NOISE = 4.0  # times the noise of the record: the same
 SMOOTHED_OVER = 2.0  # s: what is slower is the work of regulators and turbine
@@ -358,6 +359,8 @@ def mismatch(comparison: Comparison, steady: float) -> float:
 def _swing_cause(name: str, comparison: Comparison, steady: float) -> Iterator[Cause]:
     overlay = comparison.overlays[name]
     noise = noise_of(overlay.measured[np.isfinite(overlay.error)])
+    if np.count_nonzero(comparison.time[np.isfinite(overlay.error)] >= steady) < FEWEST_SWINGING:
+        return
     time, measured, simulated = both_swings(comparison, name, steady)
     sizes = [float(np.sqrt(np.mean(y * y))) for y in (measured, simulated)]
     least = max(LEAST_SWING, LEAST_OVER_NOISE * noise)

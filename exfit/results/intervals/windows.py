@@ -126,6 +126,8 @@ def windows_of(setup: ExperimentSetup) -> Iterator[Window]:
     signals = {name: record.signals[name] for name in ("vt", "ifd") if name in record.signals}
     steps = steps_of_record(record.time, signals).steps
     instants = [(step.at - step.error, step.at) for step in steps if not step.from_start]
+    if not instants:
+        return
     ends = [*(early for early, _ in instants[1:]), float(record.time[-1])]
     before = -inf
     for (early, at), end in zip(instants, ends, strict=True):
@@ -190,7 +192,10 @@ def _estimates(
 def _of_part(fit: WindowFit, moved: Array, rows: NDArray[np.bool_]) -> tuple[float, Array]:
     """Change of T'd0 by a part of the errors, and its errors by the noise ``moved`` (K, N)."""
     slopes, others = fit.slopes[rows, 0], fit.slopes[rows, 1:]
-    along = slopes / (slopes @ slopes)
+    power = float(slopes @ slopes)
+    if power == 0.0:  # it does nothing there
+        return 0.0, np.zeros(len(fit.draws))
+    along = slopes / power
     with_others = fit.draws[:, rows] + moved[:, 1:] @ others.T
     return -float(along @ fit.errors[rows]), -with_others @ along
 
