@@ -125,7 +125,7 @@ def droop_curve(
     if droop is None:
         raise ModelError(f"{governor.name} has no droop among {', '.join((*DROOPS, *GAINS))}")
     steps, (name, measured) = np.diff(time), answer
-    if len(time) < FEWEST or min(steps) <= 0.0 or np.ptp(steps) > EVEN * np.median(steps):
+    if len(time) < FEWEST or np.min(steps) <= 0.0 or np.ptp(steps) > EVEN * np.median(steps):
         raise RecordError(f"time: {FEWEST} samples and more at even intervals are needed")
     sampling, first = float(np.median(steps)), int(np.ceil(SETTLING * len(time)))
     rating = data["Trate_Mbase"] if name == "p" else 1.0

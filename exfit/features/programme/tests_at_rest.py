@@ -31,13 +31,13 @@ from exfit.features.programme.v_curve import (
 from exfit.fitting.parameters import FreeParameter, free_parameter
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model
-from exfit.records.clock import why_unusable
+from exfit.records.clock import check_finite
 from exfit.records.formats import open_table
 from exfit.records.formats.table import column_error
 from exfit.records.units import alike, needs_base
 from exfit.signals import FIELDS, TERMINALS
 from exfit.util.arrays import Array
-from exfit.util.text import LARGEST, listed, show
+from exfit.util.text import listed, show
 
 Values = Mapping[str, float]
 
@@ -77,9 +77,7 @@ def points_of(test: SaturationTest | SteadyTest | GovernorTest, folder: Path) ->
                 text = f"in {in_file} as the file says, not in {column.unit}"
                 raise column_error(table.path, names[signal], text)
     for name, cells in numbers.items():
-        for row in np.flatnonzero(~(np.abs(cells) <= LARGEST))[:1]:
-            text = f"{cells[row]} {why_unusable(cells[row])}"
-            raise column_error(table.place(int(row)), name, text)
+        check_finite(cells, f"column {name!r}", table.place)
     columns = {signal: numbers[name] for signal, name in names.items()}
     return Points(columns, units, table.path)
 
